@@ -36,6 +36,7 @@ use crate::error::{FeatureError, require_finite};
 use crate::height_map::HeightMap;
 use crate::plane::PlaneFit;
 use levelled::{Cloud, Footprint, flipped};
+use settings::side_of;
 
 /// Sides of the grid `[px]` on which the ground is looked for to choose the down-sampling.
 const COARSE_SIDE_PX: usize = 160;
@@ -115,7 +116,7 @@ pub fn level_depth(
             let glance = cloud(coarse)?;
             let (plane, _) = glance.ground(segmentation, grains(coarse)?.as_deref(), up)?;
             let pixel = glance.resolution(&plane);
-            let n = segmentation.factor(of_area(pixel) / coarse as f64, side);
+            let n = segmentation.factor(side_of(pixel) / coarse as f64, side);
             let whole = |width: f64, pixels: usize| width * pixels as f64 / coarse as f64;
             let extent = (whole(pixel.0, image.width), whole(pixel.1, image.height));
             (n, require_some(cloud(n)?, segmentation, extent)?)
@@ -140,11 +141,6 @@ fn require_some(
         }
         _ => Ok(cloud),
     }
-}
-
-/// Side of the square that is as large as a pixel.
-fn of_area((x, y): (f64, f64)) -> f64 {
-    (x * y).sqrt()
 }
 
 /// What of it lies in the region and in the field of view that are asked for; columns of the image go `along`.
@@ -195,7 +191,7 @@ pub fn level_height_map(
     if segmentation.colour.is_some() {
         return Err(incomplete_colour(false, true));
     }
-    let resolution = of_area((map.resolution_x, map.resolution_y));
+    let resolution = side_of((map.resolution_x, map.resolution_y));
     let n = segmentation.factor(resolution, map.width.min(map.height));
     let inside = segmentation.inside(map.width, map.height, n);
     let small = flying::removed_heights(map, segmentation.flying_deg).downsample(n)?;

@@ -4,6 +4,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::levelled::Levelled;
 use super::part::Part;
+use super::settings::side_of;
 use super::shape::{self, Shape};
 use crate::error::FeatureError;
 use crate::plane::PlaneFit;
@@ -107,7 +108,7 @@ impl Formation {
     /// Side of a pixel on the ground `[m]`, the root of its area: what diagnostic statistics take for the spacing of
     /// points, as they do of a pour.
     pub fn spacing(&self) -> f64 {
-        super::of_area(self.resolution)
+        side_of(self.resolution)
     }
 }
 

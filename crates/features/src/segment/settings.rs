@@ -203,6 +203,11 @@ impl Segmentation {
     }
 }
 
+/// Side of the square that is as large as a pixel of these widths along x and y.
+pub(super) fn side_of((x, y): (f64, f64)) -> f64 {
+    (x * y).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
