@@ -1,5 +1,6 @@
 """Conditions whose numbers hang together, recordings that are means, how they are read."""
 
+import re
 import struct
 from pathlib import Path
 from types import SimpleNamespace
@@ -96,6 +97,17 @@ def test_pours_at_the_conditions_alone_have_all_their_numbers() -> None:
     plan = planned(places, 420, 0)
     assert plan.places == places.places and plan.conditions == places.inputs
     assert (plan.base, plan.each) == (300, 78)
+
+
+@pytest.mark.parametrize("names", [(), ("camera.offset",), ("tilt.x", "camera.offset")])
+def test_the_budget_that_is_said_to_be_enough_is(names: tuple[str, ...]) -> None:
+    asked = task(False, averaged=True, effects=names)
+    with pytest.raises(ObservationError, match=f"{len(names)} effects, ") as told:
+        planned(asked, 10, 0)
+    found = re.search(r"(\d+) would be enough", str(told.value))
+    assert found and planned(asked, int(found[1]), 0).base >= 300
+    with pytest.raises(ObservationError, match="would be enough"):
+        planned(asked, int(found[1]) - 1, 0)
 
 
 def test_an_archive_may_leave_sealed_conditions_out(tmp_path: Path) -> None:

@@ -320,13 +320,13 @@ def planned(
     # A small budget has fewer pours to share than the base model needs.
     base = max(int(_BASE_SHARE * spare), min(_LEAST_BASE, spare - _LEAST_EACH * own))
     each = (spare - base) // max(own, 1)
-    if base < _LEAST_BASE or each < _LEAST_EACH:
+    if base < _LEAST_BASE or (own and each < _LEAST_EACH):
         enough = kept + max(
             _LEAST_BASE + _LEAST_EACH * own, int(_LEAST_EACH * own / (1 - _BASE_SHARE)) + 1
         )
         raise ObservationError(
-            f"a budget of {budget} pours is too small for {own} effects and "
-            f"{len(task.conditions)} conditions; {enough} would be enough"
+            f"a budget of {budget} pours is too small for {len(task.conditions)} conditions and "
+            f"{len(task.library)} effects, {own} of them poured; {enough} would be enough"
         )
     return ArchivePlan(
         scene=task.at_first(),
