@@ -365,9 +365,10 @@ def main() -> None:
     options = parser.parse_args()
     if options.do == "table":
         table(options.out)
-    elif options.do in ("form", "seen"):
-        told = {"form": form, "seen": seen}[options.do]
-        told(options.out, options.budget, options.threads)
+    elif options.do == "form":
+        form(options.out, options.budget, options.threads)
+    elif options.do == "seen":
+        seen(options.out, options.budget, options.threads)
     else:
         run(options.out, options.only, options.budget, options.threads)
 

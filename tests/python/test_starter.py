@@ -7,7 +7,8 @@ import pytest
 
 import granulcal as gc
 from granulcal.cli import main
-from granulcal.starter.folder import D435, FILES, SCENES, lens_of, scene_text, write_folder
+from granulcal.pours.scene import BUILT_IN
+from granulcal.starter.folder import D435, FILES, lens_of, scene_text, write_folder
 from granulcal.starter.numbers import set_numbers
 from granulcal.starter.samples import HIDDEN
 
@@ -22,7 +23,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", BUILT_IN)
 def test_the_commented_scene_is_the_built_in_one_under_another_camera(name: str) -> None:
     scene, built_in = gc.Scene.from_toml(scene_text(name, D435)), gc.Scene.built_in(name)
     paths = ["grains.count", "grains.diameter", "grains.density", "end.horizon"]

@@ -19,9 +19,10 @@ from granulcal.words import not_there
 if TYPE_CHECKING:
     from granulcal.measured.segmentation import SegmentationSettings
 
-__all__ = ["Material", "Scene", "require_scene"]
+__all__ = ["BUILT_IN", "Material", "Scene", "require_scene"]
 
-_BUILT_IN = ("funnel", "drop")
+BUILT_IN = ("funnel", "drop")
+"""Scenes that are asked for by name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,10 +164,10 @@ class Scene:
             FileNotFoundError: neither the word nor a file.
             ValueError: the file is not a scene; the message names the key.
         """
-        if str(name) in _BUILT_IN:
+        if str(name) in BUILT_IN:
             return cls.built_in(str(name))
         if not Path(name).exists():
-            raise FileNotFoundError(not_there(str(name), "scene", _BUILT_IN))
+            raise FileNotFoundError(not_there(str(name), "scene", BUILT_IN))
         return cls.load(name)
 
     @classmethod

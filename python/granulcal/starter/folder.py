@@ -7,14 +7,12 @@ from pathlib import Path
 
 from granulcal.files import replace_file
 from granulcal.measured.recording import Recording
-from granulcal.pours.scene import Scene
+from granulcal.pours.scene import BUILT_IN, Scene
 from granulcal.starter.numbers import with_numbers
 from granulcal.starter.texts import CAMERA, DROP_START, FUNNEL_START, LOOP, PRIOR, SCENE
 
-__all__ = ["CONDITIONS", "FILES", "SCENES", "Lens", "doubt_of_pixels", "lens_of", "write_folder"]
+__all__ = ["CONDITIONS", "FILES", "Lens", "doubt_of_pixels", "lens_of", "write_folder"]
 
-SCENES = ("funnel", "drop")
-"""Built-in scenes."""
 FILES = ("scene.toml", "prior.toml", "camera.toml", "loop.toml")
 """What a folder begins with."""
 CONDITIONS = {"low": 0.06, "high": 0.12}
@@ -133,8 +131,8 @@ def write_folder(
             recording is below what is poured from.
         FileExistsError: a file is there already.
     """
-    if scene not in SCENES:
-        raise ValueError(f"scene must be one of {', '.join(SCENES)}, got {scene!r}")
+    if scene not in BUILT_IN:
+        raise ValueError(f"scene must be one of {', '.join(BUILT_IN)}, got {scene!r}")
     there = [name for name in FILES if (folder / name).exists()]
     if there and not force:
         raise FileExistsError(f"{folder} has {', '.join(there)} already; --force writes them anew")

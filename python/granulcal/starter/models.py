@@ -9,13 +9,12 @@ from pathlib import Path
 from granulcal import _native
 from granulcal.bayessim.storage.place import MODEL_JSON
 from granulcal.documents import Table, read_json
-from granulcal.pours.scene import Scene
+from granulcal.pours.scene import BUILT_IN, Scene
 from granulcal.pours.simulate import simulate
 from granulcal.prior import Prior
 from granulcal.words import did_you_mean
 
 __all__ = [
-    "BUILT_IN",
     "MADE",
     "cache_folder",
     "find_model",
@@ -25,8 +24,6 @@ __all__ = [
     "model_named",
 ]
 
-BUILT_IN = ("funnel", "drop")
-"""Scenes that a model can be asked for by name."""
 MADE = "made.json"
 """Mark of such a model: what it was made of."""
 # What the folder of `generate` holds.
