@@ -32,6 +32,9 @@ Array = NDArray[np.float64]
 # Width of "near" in unit coordinates of parameters and conditions.
 NEAR = 0.35
 _STEP = 1e-3
+# Share of its prior's upper end to which an effect's direction leads: about what is hardly seen. An
+# effect that bends has another direction at small strengths than at half of them (drag, blur).
+_FAINT = 0.25
 
 
 @dataclass(frozen=True)
@@ -174,17 +177,19 @@ class LinearisedSurrogate:
     def direction(self, v: Array, k: int, psi: Array | None = None) -> Array:
         """Returns what effect k does for a unit of strength, shape (H m,).
 
-        One-sided: half the prior's upper end over 1/2; two-sided: the derivative. `psi` are the
+        From none of it to what is hardly seen (`_FAINT`); two-sided: the derivative. `psi` are the
         strengths of the other effects.
         """
         at = self.none() if psi is None else psi
         low, high = at.copy(), at.copy()
-        if self.surrogate.design.effects[k].is_two_sided:
-            low[k], high[k] = -0.25, 0.25
-        else:
-            low[k], high[k] = 0.0, 0.5
+        low[k], high[k] = self._span(k)
         means = self._means(np.tile(v, (2, 1)), np.stack([low, high]))
-        return 2 * (means[1] - means[0])
+        return (means[1] - means[0]) / (high[k] - low[k])
+
+    def _span(self, k: int) -> tuple[float, float]:
+        """Strengths between which an effect has its direction."""
+        is_two_sided = self.surrogate.design.effects[k].is_two_sided
+        return (-_FAINT if is_two_sided else 0.0), _FAINT
 
     def covariance(self, v: Array, psi: Array) -> Array:
         """Returns V, shape (H m, H m)."""
@@ -243,12 +248,11 @@ class LinearisedSurrogate:
     @cached_property
     def _direction_errors(self) -> list[Array]:
         found = []
-        for k, effect in enumerate(self.surrogate.design.effects):
-            root = self.error_roots[1 + 2 * k]
-            if effect.is_two_sided:
-                root = root + 2 * (self._curve_root(k, 0.25) - self._curve_root(k, -0.25))
-            else:
-                root = root + 0.5 * self.error_roots[2 + 2 * k] + 2 * self._curve_root(k, 0.5)
+        for k in range(len(self.surrogate.design.effects)):
+            low, high = self._span(k)
+            root = self.error_roots[1 + 2 * k] + (low + high) * self.error_roots[2 + 2 * k]
+            curve = self._curve_root(k, high) - self._curve_root(k, low)
+            root = root + curve / (high - low)
             shift = self.shift_roots[k]
             found.append(self._error(root) + shift @ shift.T)
         return found
