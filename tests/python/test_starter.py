@@ -101,6 +101,20 @@ def test_images_are_compared_at_a_pixel_about_as_wide_as_the_grains_that_are_set
     assert f"here {told} diameters.\n" in (tmp_path / "scene.toml").read_text()
 
 
+def test_grains_of_two_metres_are_refused_by_what_the_camera_sees(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for scene in BUILT_IN:
+        words = ["init", str(tmp_path / "new"), "--scene", scene]
+        assert main([*words, "--set", "grains.diameter=2"]) == 2
+        told = capfd.readouterr().err
+        assert "grains.diameter must be at most 0.393 m, for the camera sees 0.492 m" in told
+        assert "got 2" in told and not (tmp_path / "new").exists()
+        for wrong in ("0", "-0.004"):
+            assert main([*words, "--set", f"grains.diameter={wrong}"]) == 2
+            assert "grains.diameter must be positive and finite" in capfd.readouterr().err
+
+
 def test_a_camera_too_far_for_the_grains_is_told_before_the_first_pour(
     folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

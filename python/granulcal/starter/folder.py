@@ -141,9 +141,11 @@ def write_folder(
         tip = Scene.built_in(scene).get(path)
         _require_above(float(changes.get(path, tip)), scene, lens)
     file = folder / "scene.toml"
-    text = with_numbers(scene_text(scene, lens), changes, file)
-    # Once it is known to be a number of a scene, images are compared at a pixel that fits it.
-    diameter = Scene.from_toml(text).get("grains.diameter")
+    given = changes.get("grains.diameter")
+    # What is no diameter is refused by name with the other numbers.
+    diameter = given if isinstance(given, float | int) and given > 0 else None
+    if diameter is not None:
+        _require_in_view(diameter, lens)
     text = with_numbers(scene_text(scene, lens, diameter), changes, file)
     written = Scene.from_toml(text)
     replace_file(file, text)
@@ -177,6 +179,16 @@ def _require_above(tip: float, name: str, lens: Lens) -> None:
             f"above {what} at {tip:g} m ({_TIPS[name]}): is the depth unit right, "
             f"{lens.unit:g} m per count? A PNG has it from depth_unit in the TOML of --camera. "
             f"If it is, give the true height by --set {_TIPS[name]}=METRES"
+        )
+
+
+def _require_in_view(diameter: float, lens: Lens) -> None:
+    """Refuses grains of a diameter [m] that no pixel of the lens's image is as wide as."""
+    most = lens.field_width / _PIXEL
+    if diameter > most:
+        raise ValueError(
+            f"grains.diameter must be at most {most:.3g} m, for the camera sees "
+            f"{lens.field_width:.3g} m of the ground; got {diameter:g}"
         )
 
 
