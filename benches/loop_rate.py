@@ -25,8 +25,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import rates
 from scipy.ndimage import gaussian_filter
-from scipy.stats import binomtest
 
 import granulcal as gc
 from granulcal.loop.analysis import Analysis
@@ -372,10 +372,7 @@ def _p_of_base(out: Path, name: str, known: Surrogate, store: Archive, rules: Th
 
 def rate(what: str, hits: list[bool]) -> None:
     """Prints the rate of something, with its exact interval."""
-    if hits:
-        low, high = binomtest(sum(hits), len(hits)).proportion_ci(0.95, "exact")
-        share = f"{sum(hits)} of {len(hits)} = {100 * sum(hits) / len(hits):.0f} %"
-        print(f"| {what} | {share} | {100 * low:.0f} to {100 * high:.0f} % |")
+    rates.rate(what, hits, method="exact")
 
 
 def rows_of(file: Path) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
+from rates import median, rate
 
 from granulcal.loop import Thresholds
 from granulcal.loop.check.coverage import needed_stretch
@@ -212,17 +212,9 @@ def _is_in(row: Row, ends: Sequence[float]) -> bool:
 
 
 def _rate(name: str, hits: list[bool], target: str = "") -> None:
-    n, k = len(hits), sum(hits)
-    if n == 0:
-        print(f"| {name} | 0 of 0 | | {target} |")
-        return
-    low, high = binomtest(k, n).proportion_ci(method="wilson")
-    print(f"| {name} | {k} of {n} = {k / n:.0%} | {low:.0%} to {high:.0%} | {target} |")
+    # Its tables have a column of targets, which may be empty.
+    rate(name, hits, target)
 
 
 def _median(name: str, values: list[float | None], target: str = "") -> None:
-    known = [v for v in values if v is not None and np.isfinite(v)]
-    if known:
-        low, middle, high = np.quantile(known, [0.25, 0.5, 0.75])
-        shown = f"{middle:.2f} ({low:.2f}, {high:.2f})"
-        print(f"| {name}: median (quartiles), n = {len(known)} | {shown} | | {target} |")
+    median(name, values, target)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from loop_pile import HIDDEN, LIBRARY, PileLoopToy
 from numpy.typing import NDArray
-from scipy.stats import binomtest
+from rates import median, rate
 
 from granulcal.loop import ConditionPours, Surrogate, Thresholds, compare, trace
 from granulcal.loop.check.discrepancy import Discrepancy
@@ -201,21 +201,21 @@ def table(paths: list[Path]) -> None:
     hidden = [r for r in rows if r["kind"] == "hidden"]
     say = ("EFFECT", "SET", "EFFECTS")
     print("| what | rate | 95 % |\n|---|---|---|")
-    _rate("false alarm, p <= .05", [r["p"] <= 0.05 for r in null])
-    _rate("false alarm, p <= .01", [r["p"] <= 0.01 for r in null])
+    rate("false alarm, p <= .05", [r["p"] <= 0.05 for r in null])
+    rate("false alarm, p <= .01", [r["p"] <= 0.01 for r in null])
     for i, name in enumerate(("library", "any", "smooth")):
-        _rate(f"false alarm, {name} alone", [r["p_each"][i] <= 0.05 for r in null])
-    _rate("null named", [r["verdict"] in say for r in null])
+        rate(f"false alarm, {name} alone", [r["p_each"][i] <= 0.05 for r in null])
+    rate("null named", [r["verdict"] in say for r in null])
     bands = ((0.0, 0.3), (0.3, 0.7), (0.7, 1.5), (1.5, 99.0))
     for low, high in bands:
         chosen = [r for r in single if low <= r["delta"] < high]
-        _rate(f"detected, delta {low:g}-{high:g}", [r["p"] <= 0.05 for r in chosen])
+        rate(f"detected, delta {low:g}-{high:g}", [r["p"] <= 0.05 for r in chosen])
         named = [r for r in chosen if r["verdict"] in say]
-        _rate(f"named, delta {low:g}-{high:g}", [r in named for r in chosen])
-        _rate("  of these the first is right", [r["first"] == r["effects"][0] for r in named])
+        rate(f"named, delta {low:g}-{high:g}", [r in named for r in chosen])
+        rate("  of these the first is right", [r["first"] == r["effects"][0] for r in named])
     named = [r for r in single if r["verdict"] in say]
-    _rate("single, named: truth in the set", [r["effects"][0] in r["named"] for r in named])
-    _rate(
+    rate("single, named: truth in the set", [r["effects"][0] in r["named"] for r in named])
+    rate(
         "single, p <= .01: UNEXPLAINED",
         [r["verdict"] == "UNEXPLAINED" for r in single if r["p"] <= 0.01],
     )
@@ -223,47 +223,30 @@ def table(paths: list[Path]) -> None:
         print(f"| mean size of the set | {np.mean([len(r['named']) for r in named]):.2f} | |")
     spoken = [r for r in rows if r["kind"] in ("null", "single", "pair")]
     wrong = [r["verdict"] in say and not set(r["named"]) & set(r["effects"]) for r in spoken]
-    _rate("false naming, of all library sets", wrong)
+    rate("false naming, of all library sets", wrong)
     told = [w for r, w in zip(spoken, wrong, strict=True) if r["verdict"] in say]
-    _rate("false naming, of named library sets", told)
+    rate("false naming, of named library sets", told)
     strong = [r for r in hidden if r["delta"] >= 1]
-    _rate("hidden, delta >= 1: not named", [r["verdict"] not in say for r in strong])
-    _rate("hidden, delta >= 1: UNEXPLAINED", [r["verdict"] == "UNEXPLAINED" for r in strong])
-    _rate("hidden, all: named", [r["verdict"] in say for r in hidden])
-    _rate("pairs, p <= .05", [r["p"] <= 0.05 for r in pair])
+    rate("hidden, delta >= 1: not named", [r["verdict"] not in say for r in strong])
+    rate("hidden, delta >= 1: UNEXPLAINED", [r["verdict"] == "UNEXPLAINED" for r in strong])
+    rate("hidden, all: named", [r["verdict"] in say for r in hidden])
+    rate("pairs, p <= .05", [r["p"] <= 0.05 for r in pair])
     two = [r for r in pair if r["verdict"] in say]
-    _rate("pairs, named: no false member", [set(r["named"]) <= set(r["effects"]) for r in two])
-    _rate("pairs: both found", [set(r["named"]) == set(r["effects"]) for r in pair])
+    rate("pairs, named: no false member", [set(r["named"]) <= set(r["effects"]) for r in two])
+    rate("pairs: both found", [set(r["named"]) == set(r["effects"]) for r in pair])
     inside = [r["strength"][1] <= r["strengths"][0] <= r["strength"][2] for r in single]
-    _rate("strength in its 95 % interval, all singles", inside)
+    rate("strength in its 95 % interval, all singles", inside)
     chosen = [i for i, r in zip(inside, single, strict=True) if r["p"] <= 0.01]
-    _rate("strength in its 95 % interval, p <= .01", chosen)
+    rate("strength in its 95 % interval, p <= .01", chosen)
     # Of a two-sided effect towards its own sign: too weak is below 0.
     shift = [(r["strength"][0] - r["strengths"][0]) * np.sign(r["strengths"][0]) for r in single]
     size = np.sqrt(np.mean(np.square(shift)))
     print(f"| strength: mean error towards its sign, rms | {np.mean(shift):.3f}, {size:.3f} | |")
     right = [r for r in single if r["verdict"] == "EFFECT" and r["effects"][0] in r["named"]]
-    _median("R at sealed heights, right effect", [r["removed"] for r in right])
-    _median("R, hidden that was named", [r["removed"] for r in hidden if r["verdict"] in say])
+    median("R at sealed heights, right effect", [r["removed"] for r in right])
+    median("R, hidden that was named", [r["removed"] for r in hidden if r["verdict"] in say])
     unexplained = [r.get("fallback") for r in rows if r["verdict"] == "UNEXPLAINED"]
-    _median("R of the correction, UNEXPLAINED", unexplained)
-
-
-def _rate(name: str, hits: list[bool]) -> None:
-    n, k = len(hits), sum(hits)
-    if n == 0:
-        print(f"| {name} | 0 of 0 | |")
-        return
-    low, high = binomtest(k, n).proportion_ci(method="wilson")
-    print(f"| {name} | {k} of {n} = {k / n:.0%} | {low:.0%} to {high:.0%} |")
-
-
-def _median(name: str, values: list[float]) -> None:
-    known = [v for v in values if v is not None and np.isfinite(v)]
-    if known:
-        low, middle, high = np.quantile(known, [0.25, 0.5, 0.75])
-        shown = f"{middle:.2f} ({low:.2f}, {high:.2f})"
-        print(f"| {name}: median (quartiles), n = {len(known)} | {shown} | |")
+    median("R of the correction, UNEXPLAINED", unexplained)
 
 
 def _read(paths: list[Path]) -> list[dict[str, Any]]:

@@ -16,6 +16,25 @@ def names_of_granulcal(file):
             yield from ((module, alias.name) for alias in node.names)
 
 
+def test_rates_of_benches_have_their_exact_and_wilson_intervals(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("scipy")
+    monkeypatch.syspath_prepend(ROOT / "benches")
+    rates = import_module("rates")
+    # 1 - 0.025^(1/32) = 0.109, and z^2 / (10 + z^2) = 0.278 of 1.96.
+    rates.rate("alarm", [False] * 32, method="exact")
+    rates.rate("alarm", [False] * 10, "<= 5 %")
+    rates.rate("named", [])
+    rates.median("left", [None, 1.0, float("nan"), 3.0], "")
+    assert capsys.readouterr().out.splitlines() == [
+        "| alarm | 0 of 32 = 0 % | 0 to 11 % |",
+        "| alarm | 0 of 10 = 0 % | 0 to 28 % | <= 5 % |",
+        "| named | 0 of 0 |  |",
+        "| left: median (quartiles), n = 2 | 2.00 (1.50, 2.50) |  |  |",
+    ]
+
+
 def test_what_benches_import_is_there():
     pytest.importorskip("torch")
     files = [file for folder in FOLDERS for file in sorted((ROOT / folder).rglob("*.py"))]
