@@ -32,9 +32,9 @@ Array = NDArray[np.float64]
 # Width of "near" in unit coordinates of parameters and conditions.
 NEAR = 0.35
 _STEP = 1e-3
-# Share of its prior's upper end to which an effect's direction leads: about what is hardly seen. An
-# effect that bends has another direction at small strengths than at half of them (drag, blur).
-_FAINT = 0.25
+FAINT, PLAIN = 0.25, 0.5
+"""Shares of its prior's upper end to which the directions of an effect lead: about what is hardly
+seen, and what is. Effects that bend (drag, blur, rods) go elsewhere at one than at the other."""
 
 
 @dataclass(frozen=True)
@@ -174,22 +174,21 @@ class LinearisedSurrogate:
         means = self._means(moved_v, moved_psi)
         return means[0], ((means[1::2] - means[2::2]) / (2 * _STEP)).T
 
-    def direction(self, v: Array, k: int, psi: Array | None = None) -> Array:
+    def direction(self, v: Array, k: int, psi: Array | None = None, to: float = FAINT) -> Array:
         """Returns what effect k does for a unit of strength, shape (H m,).
 
-        From none of it to what is hardly seen (`_FAINT`); two-sided: the derivative. `psi` are the
-        strengths of the other effects.
+        From none of it to the strength `to`; two-sided: the derivative. `psi` are the strengths of
+        the other effects.
         """
         at = self.none() if psi is None else psi
         low, high = at.copy(), at.copy()
-        low[k], high[k] = self._span(k)
+        low[k], high[k] = self._span(k, to)
         means = self._means(np.tile(v, (2, 1)), np.stack([low, high]))
         return (means[1] - means[0]) / (high[k] - low[k])
 
-    def _span(self, k: int) -> tuple[float, float]:
+    def _span(self, k: int, to: float = FAINT) -> tuple[float, float]:
         """Strengths between which an effect has its direction."""
-        is_two_sided = self.surrogate.design.effects[k].is_two_sided
-        return (-_FAINT if is_two_sided else 0.0), _FAINT
+        return (-FAINT, FAINT) if self.surrogate.design.effects[k].is_two_sided else (0.0, to)
 
     def covariance(self, v: Array, psi: Array) -> Array:
         """Returns V, shape (H m, H m)."""

@@ -12,7 +12,8 @@ $$ S_k = D_k^T r, \quad I_{kl} = D_k^T M D_l, \quad \hat\psi_k = S_k / I_{kk}, \
    T_k = \max(0, \hat\psi_k)^2 I_{kk}, \quad c_{kl} = I_{kl} / \sqrt{I_{kk} I_{ll}} $$
 
 (no cut at 0 for two-sided effects), and $\kappa_k = I_{kk} / D_k^T D_k$ is the share of an effect
-that the parameters cannot mimic.
+that the parameters cannot mimic. $D_k$ is what the effect does where it is hardly seen; since some
+bend, $T_k$ is the larger of that and of the same along what it does at twice that strength.
 
 Reference:
     Rao, Large sample tests of statistical hypotheses, Proc. Camb. Phil. Soc. 44, 1948.
@@ -27,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.surrogate.baseline import Fit
-from granulcal.loop.surrogate.linearised import LinearisedSurrogate
+from granulcal.loop.surrogate.linearised import FAINT, PLAIN, LinearisedSurrogate
 
 __all__ = ["Scores", "families"]
 
@@ -52,6 +53,7 @@ class Scores:
         slopes: whitened J, shape (n, p + |A|).
         precision: diagonal of Lambda, shape (p + |A|,).
         directions: whitened D, shape (n, K).
+        stronger: the same of stronger effects, along which they are looked for as well.
         direction_errors: trace of M cov(D_k), shape (K,).
         smooth: root of the whitened kernel of an unknown discrepancy, shape (n, n).
     """
@@ -62,6 +64,7 @@ class Scores:
     slopes: Array
     precision: Array
     directions: Array
+    stronger: Array
     direction_errors: Array
     smooth: Array
 
@@ -70,9 +73,12 @@ class Scores:
         """Returns the scores of `effects` beyond a fit."""
         design = local.surrogate.design
         whiten = np.asarray(np.linalg.inv(fit.root), dtype=np.float64)
-        directions = np.column_stack(
-            [local.direction(fit.v, k, fit.psi) for k in effects] or [np.zeros(local.size)]
-        )[:, : len(effects)]
+        directions, stronger = (
+            np.column_stack(
+                [local.direction(fit.v, k, fit.psi, to) for k in effects] or [np.zeros(local.size)]
+            )[:, : len(effects)]
+            for to in (FAINT, PLAIN)
+        )
         gap = local.conditions[:, None] - local.conditions[None]
         kernel = np.exp(-0.5 * np.sum(gap**2, axis=2) / DISCREPANCY_LENGTH**2)
         kernel_root = np.linalg.cholesky(kernel + 1e-9 * np.eye(len(kernel)))
@@ -85,6 +91,7 @@ class Scores:
             slopes=whiten @ fit.slopes,
             precision=precision,
             directions=whiten @ directions,
+            stronger=whiten @ stronger,
             direction_errors=np.zeros(len(effects)),
             smooth=smooth,
         )
@@ -125,9 +132,15 @@ class Scores:
 
     def squares(self, residuals: Array) -> Array:
         """Returns T of whitened efficient `residuals` (n, b), shape (K, b)."""
-        strengths = self.strengths(residuals)
-        cut = np.where(self.two_sided[:, None], strengths, np.maximum(strengths, 0.0))
-        return cut**2 * np.maximum(np.diag(self.information), 1e-12)[:, None]
+        along = (self._along(columns, residuals) for columns in (self.directions, self.stronger))
+        return np.maximum(*along)
+
+    def _along(self, columns: Array, residuals: Array) -> Array:
+        """Squares of `residuals` (n, b) along directions (n, K), shape (K, b)."""
+        information = np.maximum(np.sum(columns * self.remain(columns), axis=0), 1e-12)
+        score = columns.T @ residuals
+        cut = np.where(self.two_sided[:, None], score, np.maximum(score, 0.0))
+        return cut**2 / information[:, None]
 
     def unknown(self, residuals: Array) -> Array:
         """Returns the variance-component score V of `residuals` (n, b), shape (b,)."""
