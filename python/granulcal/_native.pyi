@@ -15,6 +15,7 @@ LAW: int
 def law_of(scene_toml: str | None) -> int: ...
 
 SIGNIFICANCE: float
+UNIT_FACTOR: float
 DISCHARGE_RANGE: tuple[float, float]
 __version__: str
 

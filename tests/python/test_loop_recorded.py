@@ -3,6 +3,7 @@
 import argparse
 import json
 import shutil
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -193,6 +194,21 @@ def test_recordings_are_asked_whether_they_can_be_of_the_scene(
     assert all(str(image) in doubt for doubt in doubts)
 
 
+def test_no_recording_is_opened_more_often_than_another(
+    scene: gc.Scene, recorded: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened, plain = Counter[Path](), gc.Recording.open
+
+    def counted(path: Path, **settings: Any) -> gc.Recording:
+        opened[path] += 1
+        return plain(path, **settings)
+
+    monkeypatch.setattr(gc.Recording, "open", counted)
+    # The first of a condition is asked for its ground, too.
+    task_of(scene, recorded).require_readable()
+    assert opened == dict.fromkeys(recorded, 2)
+
+
 def test_a_map_a_funnel_above_the_camera_and_pixels_without_data_are_told(
     scene: gc.Scene, recorded: list[Path], tmp_path: Path
 ) -> None:
@@ -230,6 +246,13 @@ def test_a_map_a_funnel_above_the_camera_and_pixels_without_data_are_told(
     assert "the ground lies 0.3 m from the camera, of the scene's" in doubt
     assert doubt.startswith("here: ") and "5 % too large" in doubt
     assert task_of(scene.with_({"camera.height": 0.297}), recorded).require_readable() == ()
+    # More than three times as far off a recording asks for the unit, and nothing says it again.
+    for height, is_told_of_unit in ((0.102, False), (0.098, True)):
+        told = task_of(scene.with_({"camera.height": height}), recorded).require_readable()
+        of_ground = [doubt for doubt in told if "the ground " in doubt and "camera.height" in doubt]
+        of_unit = [doubt for doubt in of_ground if "is the unit of the depths right" in doubt]
+        assert len(of_ground) == (len(recorded) if is_told_of_unit else 1)
+        assert of_unit == (of_ground if is_told_of_unit else [])
     # Two metres in place of two centimetres.
     hung = gc.Scene.funnel(0.02).with_({"funnel.height": 2.0, "camera.height": 0.3})
     assert (

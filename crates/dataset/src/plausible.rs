@@ -14,7 +14,7 @@ mod doubts;
 
 use crate::{DatasetError, Room};
 use bare::Bare;
-pub use doubts::LEAST_SHOWN;
+pub use doubts::{LEAST_SHOWN, UNIT_FACTOR};
 
 /// Factor on the height in which the grains start.
 const HEIGHT_MARGIN: f64 = 1.5;

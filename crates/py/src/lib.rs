@@ -84,6 +84,11 @@ mod _native {
     #[pymodule_export]
     const DISCHARGE_RANGE: (f64, f64) = granulcal_dataset::DISCHARGE_RANGE;
 
+    /// Factor between the distances of the ground in a recording and in the scene's images, above which the unit of the
+    /// depths is asked for.
+    #[pymodule_export]
+    const UNIT_FACTOR: f64 = granulcal_dataset::UNIT_FACTOR;
+
     /// How often a right model is called wrong by an observation's misfit.
     #[pymodule_export]
     const SIGNIFICANCE: f64 = granulcal_bayessim::SIGNIFICANCE;

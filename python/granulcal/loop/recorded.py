@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal import _native
 from granulcal.errors import ObservationError
 from granulcal.loop.condition import Condition, digest_of
 from granulcal.loop.effects.library import LibraryEffect
@@ -23,7 +24,7 @@ from granulcal.measured.recording import Formation, Recording, UnlikeFramesWarni
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
-__all__ = ["doubt_of_funnel", "doubts_of", "doubts_of_distance", "require_no_copies"]
+__all__ = ["doubt_of_funnel", "doubts_of", "require_no_copies"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -68,18 +69,40 @@ def _refuse_copy(first: str | None, second: str, what: str) -> None:
 
 
 def doubts_of(
-    condition: Condition, scene: Scene, prior: Prior, library: Sequence[LibraryEffect]
+    conditions: Sequence[Condition],
+    scene: Scene,
+    prior: Prior,
+    library: Sequence[LibraryEffect],
 ) -> list[str]:
-    """Returns what makes the images of a condition doubtful, a sentence each.
+    """Returns what makes the images of conditions doubtful, a sentence each.
+
+    Args:
+        conditions: all of a task.
+        scene: the base model.
+        prior: of its parameters.
+        library: effects of the task.
 
     Raises:
         ObservationError: an image that can be neither of the scene nor of it with an effect.
     """
+    found: list[str] = []
+    distances: list[float] = []
+    images = [c for c in conditions if not scene.with_(c.at).observed_names]
+    for condition in images:
+        of_it, distance = _doubts_of_one(condition, scene, prior, library)
+        found += of_it
+        distances.append(distance)
+    return [*_doubts_of_distance(images, scene, distances), *found]
+
+
+def _doubts_of_one(
+    condition: Condition, scene: Scene, prior: Prior, library: Sequence[LibraryEffect]
+) -> tuple[list[str], float]:
+    """Doubts of a condition's images, and the distance of the first one's ground [m]."""
     there = scene.with_(condition.at)
-    if there.observed_names:
-        return []
     found: list[str] = []
     missing: list[float] = []
+    distances: list[float] = []
     for path in condition.recordings:
         recording = _opened(path, condition)
         of_it = ([recording], [path], condition.reading)
@@ -93,9 +116,12 @@ def doubts_of(
             found.append(f"{path}: {recording.unlike}")
         found += doubts(there, prior, *of_it)
         settings: dict[str, Any] = {**there.reading, **condition.reading}
-        missing.append(_missing_share(recording.formation(**settings)))
+        formation = recording.formation(**settings)
+        missing.append(_missing_share(formation))
+        distances.append(abs(formation.plane.offset))
     of_funnel = doubt_of_funnel(condition.name, there)
-    return [*of_funnel, *_doubt_of_missing(there, condition, missing), *found]
+    of_all = [*of_funnel, *_doubt_of_missing(there, condition, missing), *found]
+    return of_all, distances[0]
 
 
 def _opened(path: Path, condition: Condition) -> Recording:
@@ -120,28 +146,27 @@ def doubt_of_funnel(name: str, there: Scene) -> list[str]:
     ]
 
 
-def doubts_of_distance(conditions: Sequence[Condition], scene: Scene) -> list[str]:
-    """Returns whether the ground is as far from the camera as the scene says, a sentence each.
+def _doubts_of_distance(
+    conditions: Sequence[Condition], scene: Scene, distances: Sequence[float]
+) -> list[str]:
+    """Whether the ground is as far from the camera as the scene says, a sentence each.
 
     Depths have their own scale in it. One recording speaks for those of its condition, for no
-    camera is moved between them.
+    camera is moved between them. Where it is so far off that the doubts of a recording ask for the
+    unit, they have said it.
 
     Args:
-        conditions: all of a task.
+        conditions: those of images.
         scene: the base model.
+        distances: of the ground from the camera under each [m].
     """
     conditions_of: dict[tuple[float, float], list[str]] = {}
-    for condition in conditions:
-        there = scene.with_(condition.at)
-        camera = there.to_dict()["camera"]
-        if there.observed_names or camera["projection"] != "pinhole":
+    for condition, found in zip(conditions, distances, strict=True):
+        camera = scene.with_(condition.at).to_dict()["camera"]
+        if camera["projection"] != "pinhole":
             continue
-        first = condition.recordings[0]
-        recording = _opened(first, condition)
-        settings: dict[str, Any] = {**there.reading, **condition.reading}
-        found = abs(recording.formation(**settings).plane.offset)
         stated = float(camera["height"])
-        if max(found / stated, stated / found) > 1 + _DISTANCE:
+        if 1 + _DISTANCE < max(found / stated, stated / found) <= _native.UNIT_FACTOR:
             key = stated, float(f"{found:.3g}")
             conditions_of.setdefault(key, []).append(condition.name)
     return [

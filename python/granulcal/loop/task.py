@@ -86,7 +86,7 @@ from granulcal.loop.effects.tolerance import Tolerances
 from granulcal.loop.effects.untried import untried
 from granulcal.loop.pours.forward import Coarse
 from granulcal.loop.pours.measures import is_above_axis
-from granulcal.loop.recorded import doubts_of, doubts_of_distance, require_no_copies
+from granulcal.loop.recorded import doubts_of, require_no_copies
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
@@ -409,9 +409,7 @@ class Task:
         # The few numbers that a scene observes may be the same of two pours.
         is_image = not self.scene.observed_names
         require_no_copies(self.conditions, rows if is_image else [row[:0] for row in rows])
-        of_each = (doubts_of(c, self.scene, self.prior, self.library) for c in self.conditions)
-        found = [doubt for of_one in of_each for doubt in of_one]
-        return (*doubts_of_distance(self.conditions, self.scene), *found)
+        return tuple(doubts_of(self.conditions, self.scene, self.prior, self.library))
 
     def at_first(self) -> Scene:
         """Returns the scene with the numbers that all conditions share."""

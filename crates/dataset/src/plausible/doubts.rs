@@ -38,7 +38,7 @@ const THRESHOLD: f64 = 1.25;
 const COARSE: f64 = 1.5;
 /// Factor between the distances of a recording's camera and of the scene's from the ground, above which the unit of the
 /// depths is asked for: it is wrong by 4 or 10, and cameras stand at 20 cm to 1 m.
-const FAR: f64 = 3.0;
+pub const UNIT_FACTOR: f64 = 3.0;
 /// Standard deviation of the ground about its plane, over a grain's diameter and in metres, above both of which it is
 /// said to be uneven.
 const UNEVEN: f64 = 0.5;
@@ -79,7 +79,7 @@ impl Limits {
     pub(super) fn doubt_of_distance(&self, found: f64) -> Option<String> {
         let (least, most) = self.distance?;
         let stated = found.clamp(least, most);
-        (found > FAR * stated || found < stated / FAR).then(|| {
+        (found > UNIT_FACTOR * stated || found < stated / UNIT_FACTOR).then(|| {
             format!(
                 "the ground is {} m from the camera, of the scene's images {} m (camera.height): is the unit of the depths \
                  right (depth_unit)?",
