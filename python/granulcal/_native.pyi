@@ -16,6 +16,7 @@ def law_of(scene_toml: str | None) -> int: ...
 
 SIGNIFICANCE: float
 UNIT_FACTOR: float
+MANIFEST: str
 DISCHARGE_RANGE: tuple[float, float]
 __version__: str
 

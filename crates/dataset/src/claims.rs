@@ -7,14 +7,14 @@ use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::{DatasetError, Form, files};
+use crate::{DatasetError, Form, MANIFEST, files};
 pub use product::Product;
 
 /// Endings of the files that a folder that is a recording is read from.
 const FRAMES: [&str; 4] = ["png", "npz", "mcap", "bag"];
 /// Files that a folder that is no recording is read from, besides its parts.
 const READ_FROM_FOLDERS: [&str; 5] =
-    ["manifest.toml", "model.json", "weights.safetensors", "training.parquet", "loop.toml"];
+    [MANIFEST, "model.json", "weights.safetensors", "training.parquet", "loop.toml"];
 /// Documents that name documents that name files: a task, its scene, the scene's mesh.
 const DEPTH: usize = 3;
 /// Entries of a folder that are examined.

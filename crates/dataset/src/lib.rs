@@ -88,6 +88,7 @@ pub use generate::{
 pub use granulcal_scene::{Distribution, Parameter, Prior};
 pub use header::{Header, VERSION};
 pub use input::ReadSeek;
+pub use manifest::NAME as MANIFEST;
 pub use mcap_file::{Filmed, record_pour};
 pub use merge::{Merged, merge};
 pub use message_file::{Damage, MessageFormat};

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use crate::header::{FIRST_ARITHMETIC, Header};
 use crate::{DatasetError, Form, files};
 
-/// Name of the manifest in its folder.
-pub(crate) const NAME: &str = "manifest.toml";
+/// Name of the document of a data set's folder, which says what its rows are of.
+pub const NAME: &str = "manifest.toml";
 /// The layout of folder and columns that this version writes.
 const FORMAT: u64 = 1;
 

@@ -89,6 +89,10 @@ mod _native {
     #[pymodule_export]
     const UNIT_FACTOR: f64 = granulcal_dataset::UNIT_FACTOR;
 
+    /// Name of the document of a data set's folder.
+    #[pymodule_export]
+    const MANIFEST: &str = granulcal_dataset::MANIFEST;
+
     /// How often a right model is called wrong by an observation's misfit.
     #[pymodule_export]
     const SIGNIFICANCE: f64 = granulcal_bayessim::SIGNIFICANCE;

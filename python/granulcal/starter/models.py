@@ -26,8 +26,6 @@ __all__ = [
 
 MADE = "made.json"
 """Mark of such a model: what it was made of."""
-# What the folder of `generate` holds.
-_MANIFEST = "manifest.toml"
 _SHIPPED = Path(__file__).parents[1] / "models"
 
 
@@ -92,7 +90,7 @@ def model_named(name: str | PathLike[str]) -> Path:
             made = f"; `granulcal train {name} -o model` makes one of these pours"
             raise FileNotFoundError(
                 f"{name} holds no {MODEL_JSON}; asked for is {allowed}"
-                f"{made if (path / _MANIFEST).is_file() else ''}"
+                f"{made if (path / _native.MANIFEST).is_file() else ''}"
             )
         return path
     if path.exists():

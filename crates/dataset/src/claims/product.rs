@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use crate::{DatasetError, Form, files};
+use crate::{DatasetError, Form, MANIFEST, files};
 
 /// What a command writes under one name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,7 +25,7 @@ pub enum Product {
 
 impl Product {
     /// The data set of `generate`.
-    pub const DATA_SET: Self = Self::Folder(&[("manifest.toml", Form::ManifestToml)]);
+    pub const DATA_SET: Self = Self::Folder(&[(MANIFEST, Form::ManifestToml)]);
     /// The pictures of a segmentation.
     pub const PICTURES: Self = Self::Folder(&[
         ("residual.png", Form::Png),

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from granulcal import _native
 from granulcal.documents import ListOf, Number, OneOf, Table, Text, read_json
 from granulcal.errors import TrainingDataError
 from granulcal.files import write_beside
@@ -130,7 +131,7 @@ class Archive:
         for part in parts_of(self.plan):
             folder = self.folder / part.name
             # A run that was killed at once may have left a folder without a data set.
-            is_begun = (folder / "manifest.toml").exists()
+            is_begun = (folder / _native.MANIFEST).exists()
             there = len(Dataset.load(folder)) if is_begun else 0
             count += max(part.count - there, 0)
         return count
