@@ -342,7 +342,7 @@ def seen(out: Path, budget: int, threads: int) -> None:
         for row in (row for row in rows_of(out / "rows.jsonl") if row["camera"] == camera):
             p = _p_of_base(out, row["set"], known, store, rules)
             size, needed = row["psi"], least.get(row["truth"])
-            is_seen = None if needed is None else abs(size) >= needed
+            is_seen = None if needed is None else bool(abs(size) >= needed)
             found.append((is_seen, p))
             least_seen = "" if needed is None else f"{needed:.2f}"
             print(
