@@ -1,11 +1,13 @@
 import os
 import pickle
 import stat
+import tomllib
 
 import numpy as np
 import pytest
 
 import granulcal as gc
+from granulcal.pours.statistics import UNITS
 
 
 def test_shapes_and_names(small_data):
@@ -117,6 +119,16 @@ def test_a_folder_that_cannot_be_written_is_a_permission_error(small_scene, tmp_
     tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
     with pytest.raises(PermissionError):
         gc.generate(small_scene, gc.Prior.default(), 1, out=tmp_path / "d", progress=False)
+
+
+def test_the_metadata_of_a_part_has_the_units_of_its_statistics(small_data: gc.Dataset) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    schema = parquet.read_schema(small_data.path / "part-000000.parquet")
+    units = tomllib.loads(schema.metadata[b"granulcal.units"].decode())
+    assert {name: units[name] for name in UNITS} == UNITS
+    assert (units["simulated_s"], units["energy_created"]) == ("s", "-")
+    counts = {"row", "seed", "substeps", "grains_lost", "sweeps", "unconverged", "guarded"}
+    assert set(schema.names) - set(units) == {*counts, "status", *small_data.theta_names}
 
 
 def test_pandas_gets_every_column(small_data):

@@ -4,6 +4,7 @@
 
 mod columns;
 
+use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -34,6 +35,8 @@ const VERSION_KEY: &str = "granulcal.version";
 const LAW_KEY: &str = "granulcal.law";
 const ARITHMETIC_KEY: &str = "granulcal.arithmetic";
 const SEED_KEY: &str = "granulcal.seed";
+/// Units of the columns, for who reads the file by other means: TOML, a unit a column. Files of before it have none.
+const UNITS_KEY: &str = "granulcal.units";
 const HASH_KEY: &str = "granulcal.hash";
 /// Of a file of several row groups: the hash of each, as if it were a file of its own, separated by spaces.
 const HASHES_KEY: &str = "granulcal.hashes";
@@ -52,6 +55,16 @@ pub(crate) fn write(path: &Path, header: &Header, rows: &[Row]) -> Result<(), Da
     let bytes = encode(header, rows, &columns(&header.prior.names(), &header.observed()))
         .map_err(unwritten(path))?;
     files::write_file(path, Form::Parquet, &bytes)
+}
+
+/// As versions wrote that told no units.
+#[cfg(test)]
+pub(crate) fn write_without_units(path: &Path, header: &Header, rows: &[Row]) {
+    let mut columns = columns(&header.prior.names(), &header.observed());
+    for column in &mut columns {
+        column.unit = None;
+    }
+    files::write_file(path, Form::Parquet, &encode(header, rows, &columns).unwrap()).unwrap();
 }
 
 /// A file of rows.
@@ -130,7 +143,11 @@ fn writer<W: io::Write + Send>(
         (ARITHMETIC_KEY, header.arithmetic.to_string()),
         (SEED_KEY, header.seed.to_string()),
     ];
-    let metadata = metadata.into_iter().chain(hash).chain(law);
+    let units: BTreeMap<&str, &str> =
+        columns.iter().filter_map(|column| Some((column.name.as_str(), column.unit?))).collect();
+    let units = toml::to_string(&units).map_err(|error| ParquetError::External(error.into()))?;
+    let units = (!units.is_empty()).then_some((UNITS_KEY, units));
+    let metadata = metadata.into_iter().chain(units).chain(hash).chain(law);
     let metadata = metadata.map(|(key, value)| KeyValue::new(key.to_owned(), value));
     let properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)

@@ -28,7 +28,8 @@ const PATIENCE: Duration = Duration::from_secs(45);
 #[command(long_about = "\
 Draws parameters from a prior, simulates a pour for each draw and writes one
 row a pour: parameters, seed, status, health, the 16 statistics, the diagnostic
-ones and those that the scene observes, as Parquet.
+ones and those that the scene observes, as Parquet, whose metadata
+`granulcal.units` has their units.
 
 Row i depends on the scene, the prior, the seed and i only. Stop it at any
 moment, also by pulling the plug, and start it again with the same arguments:

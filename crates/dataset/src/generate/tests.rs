@@ -192,6 +192,29 @@ fn parts_that_were_made_elsewhere_are_gathered() {
 }
 
 #[test]
+fn parts_without_units_are_gone_on_with_and_merged() {
+    let place = Place::new();
+    place.make("whole", &options(8));
+    place.make("old", &options(4));
+    let tells_units = |path: &Path| {
+        let (bytes, key) = (fs::read(path).unwrap(), b"granulcal.units");
+        bytes.windows(key.len()).any(|window| window == key)
+    };
+    let first = place.at("old/part-000000.parquet");
+    assert!(tells_units(&first));
+    let found = table::read(&first).unwrap();
+    table::write_without_units(&first, &found.header, &found.rows);
+    assert_eq!(place.make("old", &options(8)).progress.resumed, 4);
+    assert!(!tells_units(&first) && tells_units(&place.at("old/part-000001.parquet")));
+    let whole = Dataset::open(&place.at("whole")).unwrap();
+    assert_same(&Dataset::open(&place.at("old")).unwrap(), &whole);
+    let merged = place.at("all.parquet");
+    assert_eq!(merge(&[place.at("old"), place.at("whole")], &merged, 5).unwrap().repeated, 8);
+    assert_same(&Dataset::open(&merged).unwrap(), &whole);
+    assert!(tells_units(&merged));
+}
+
+#[test]
 fn rows_that_are_there_stay_when_a_part_is_brought() {
     let place = Place::new();
     let chunk = 8;

@@ -23,21 +23,24 @@ pub(super) enum Access {
 /// A column of the table.
 pub(super) struct Column {
     pub(super) name: String,
+    /// `-` where it is dimensionless; none of counts, words, and parameters, whose units scenes do not state.
+    pub(super) unit: Option<&'static str>,
     pub(super) access: Access,
 }
 
 impl Column {
     fn count(name: &str, get: fn(&Row) -> u64, set: fn(&mut Row, u64)) -> Self {
-        Self { name: name.to_owned(), access: Access::Count { get, set } }
+        Self { name: name.to_owned(), unit: None, access: Access::Count { get, set } }
     }
 
     fn number(
         name: &str,
+        unit: Option<&'static str>,
         get: impl Fn(&Row) -> f64 + 'static,
         set: impl Fn(&mut Row, f64) + 'static,
     ) -> Self {
         let access = Access::Number { get: Box::new(get), set: Box::new(set) };
-        Self { name: name.to_owned(), access }
+        Self { name: name.to_owned(), unit, access }
     }
 
     pub(super) fn physical(&self) -> Physical {
@@ -70,14 +73,15 @@ pub(super) fn columns(parameters: &[&str], observed: &[ObservedStatistic]) -> Ve
     for (i, path) in parameters.iter().enumerate() {
         columns.push(Column::number(
             path,
+            None,
             move |r| r.parameters[i],
             move |r, v| r.parameters[i] = v,
         ));
     }
     columns.extend([
         Column::count("seed", |r| r.seed, |r, v| r.seed = v),
-        Column { name: "status".to_owned(), access: Access::Status },
-        Column::number("simulated_s", |r| r.simulated_s, |r, v| r.simulated_s = v),
+        Column { name: "status".to_owned(), unit: None, access: Access::Status },
+        Column::number("simulated_s", Some("s"), |r| r.simulated_s, |r, v| r.simulated_s = v),
         Column::count(
             "substeps",
             |r| r.health.substeps as u64,
@@ -85,21 +89,25 @@ pub(super) fn columns(parameters: &[&str], observed: &[ObservedStatistic]) -> Ve
         ),
         Column::number(
             "worst_penetration",
+            Some("-"),
             |r| r.health.worst_penetration,
             |r, v| r.health.worst_penetration = v,
         ),
         Column::number(
             "mean_residual",
+            Some("-"),
             |r| r.health.mean_residual,
             |r, v| r.health.mean_residual = v,
         ),
         Column::number(
             "worst_residual",
+            Some("-"),
             |r| r.health.worst_residual,
             |r, v| r.health.worst_residual = v,
         ),
         Column::number(
             "energy_created",
+            Some("-"),
             |r| r.health.energy_created,
             |r, v| r.health.energy_created = v,
         ),
@@ -117,14 +125,16 @@ pub(super) fn columns(parameters: &[&str], observed: &[ObservedStatistic]) -> Ve
         Column::count("guarded", |r| r.health.guarded as u64, |r, v| r.health.guarded = v as usize),
         Column::number(
             "mean_contacts",
+            Some("-"),
             |r| r.health.mean_contacts,
             |r, v| r.health.mean_contacts = v,
         ),
-        Column::number("cpu_s", |r| r.cpu_s, |r, v| r.cpu_s = v),
+        Column::number("cpu_s", Some("s"), |r| r.cpu_s, |r, v| r.cpu_s = v),
     ]);
     for (i, statistic) in PAPER16.iter().enumerate() {
         columns.push(Column::number(
             statistic.name,
+            Some(statistic.unit),
             move |r| r.statistics[i],
             move |r, v| r.statistics[i] = v,
         ));
@@ -132,6 +142,7 @@ pub(super) fn columns(parameters: &[&str], observed: &[ObservedStatistic]) -> Ve
     for (i, statistic) in DIAGNOSTICS.iter().enumerate() {
         columns.push(Column::number(
             statistic.name,
+            Some(statistic.unit),
             move |r| r.diagnostics[i],
             move |r, v| r.diagnostics[i] = v,
         ));
@@ -139,6 +150,7 @@ pub(super) fn columns(parameters: &[&str], observed: &[ObservedStatistic]) -> Ve
     for (i, statistic) in observed.iter().enumerate() {
         columns.push(Column::number(
             &statistic.name,
+            Some(statistic.unit),
             move |r| r.observed[i],
             move |r, v| r.observed[i] = v,
         ));
