@@ -1,5 +1,7 @@
 """What an effect does along its strength, where many pours show it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -14,7 +16,9 @@ from granulcal.loop.surrogate.columns import (
     curved_effects,
     fold_curve,
 )
-from granulcal.loop.surrogate.linearised import LinearisedSurrogate
+from granulcal.loop.surrogate.linearised import FAINT, PLAIN, LinearisedSurrogate
+from granulcal.loop.test.score import Scores
+from granulcal.loop.test.trace import fit_at
 
 Array = NDArray[np.float64]
 
@@ -134,8 +138,8 @@ def test_the_uncertainty_is_that_of_the_features(
     found = local.mean(np.zeros(1), psi)
     np.testing.assert_allclose(found, curved.mean(u, c, rows).ravel(), atol=1e-10)
     if not psi[1]:
-        half = curved.features(u, c, np.tile([0.5, 0.0], (3, 1)))
-        chord = 2 * (half - curved.features(u, c, np.zeros((3, 2))))
+        there = curved.features(u, c, np.tile([FAINT, 0.0], (3, 1)))
+        chord = (there - curved.features(u, c, np.zeros((3, 2)))) / FAINT
         variance = np.stack([np.sum((chord @ root) ** 2, axis=1) for root in curved.roots], axis=1)
         shift = local.shift_roots[0]
         of_shift = np.sum(shift**2, axis=1)
@@ -165,3 +169,34 @@ def test_a_corner_at_0_is_learnt() -> None:
     variance = [np.sum((2 * (ends[0] - ends[1]) @ root) ** 2) for root in one.roots]
     of_shift = np.sum(local.shift_roots[0] ** 2, axis=1)
     np.testing.assert_allclose(np.diag(local.direction_error(0)) - of_shift, variance, atol=1e-10)
+
+
+def test_what_bends_is_looked_for_where_it_is_hardly_seen() -> None:
+    # As a drag does: what it does at a quarter of its range is the less the farther it goes.
+    design = Design(("a",), (), (Effect("drag"),))
+    generator = np.random.default_rng(3)
+    psi = np.zeros((640, 1))
+    psi[BASE:, 0] = generator.random(400)
+    u = generator.random(640)
+
+    def true(u: Array, psi: Array) -> Array:
+        first = 16 * psi * np.maximum(0.5 - psi, 0.0)
+        return (2 * u - 1)[:, None] * ALONG + 3 * (first * SIGHT + psi * DRAG)
+
+    x = true(u, psi) + NOISE * generator.standard_normal((640, SIZE))
+    none = np.empty((640, 0))
+    one = Surrogate.fit(design, u[:, None], none, psi, x, features=4)
+    local = LinearisedSurrogate.at(one, np.empty((1, 0)), np.ones(1), np.zeros(1))
+    scores = Scores.of(local, fit_at(local, np.zeros(1)), (0,))
+    of_stronger = replace(scores, directions=scores.stronger)
+    base = local.mean(np.zeros(1), np.zeros(1))
+    for strength, is_along_stronger in ((FAINT, False), (PLAIN, True)):
+        moved = local.mean(np.zeros(1), np.array([strength])) - base
+        left = scores.remain((scores.whiten @ moved)[:, None])
+        whole = float(np.sum(left**2))
+        # Nothing of it is lost along its own chord.
+        assert scores.squares(left)[0, 0] == pytest.approx(whole, rel=0.02)
+        along_stronger = of_stronger.squares(left)[0, 0]
+        assert (along_stronger > 0.98 * whole) == is_along_stronger
+        if not is_along_stronger:
+            assert along_stronger < 0.7 * whole

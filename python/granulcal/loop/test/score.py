@@ -108,14 +108,20 @@ class Scores:
     @property
     def information(self) -> Array:
         """I, shape (K, K)."""
-        return self.directions.T @ self.remain(self.directions)
+        return self._information(self.directions)
 
     @property
     def cosines(self) -> Array:
         """c, shape (K, K)."""
-        information = self.information
-        size = np.sqrt(np.maximum(np.diag(information), 1e-12))
-        return information / np.outer(size, size)
+        return _cosines(self.information)
+
+    @property
+    def likeness(self) -> Array:
+        """|c|, or that of stronger effects where it is less, shape (K, K)."""
+        return np.minimum(abs(self.cosines), abs(_cosines(self._information(self.stronger))))
+
+    def _information(self, columns: Array) -> Array:
+        return columns.T @ self.remain(columns)
 
     @property
     def kappa(self) -> Array:
@@ -149,9 +155,14 @@ class Scores:
         return np.sum(along**2, axis=0) / expected
 
 
+def _cosines(information: Array) -> Array:
+    size = np.sqrt(np.maximum(np.diag(information), 1e-12))
+    return information / np.outer(size, size)
+
+
 def families(scores: Scores) -> list[tuple[int, ...]]:
     """Returns groups of `scores.effects` whose directions are parallel, largest kappa first."""
-    cosines, left = np.abs(scores.cosines), set(range(len(scores.effects)))
+    cosines, left = scores.likeness, set(range(len(scores.effects)))
     groups = []
     while left:
         seed = min(left)
