@@ -165,8 +165,10 @@ impl Bodies {
 
     /// Place, velocity and angular velocity of all `[m]`, `[m/s]`, `[rad/s]`.
     pub fn motions(&self) -> impl Iterator<Item = [Vector3<f64>; 3]> + '_ {
-        let of = |body| Moving::of(body, &self.solid);
-        self.all.iter().map(of).map(|m| [m.pose.centre, m.velocity, m.omega])
+        let of = |body: &RigidBody| {
+            [body.centre.into(), body.velocity.into(), body.angular_velocity(&self.solid)]
+        };
+        self.all.iter().map(of)
     }
 
     /// Sets a body in motion; returns the kinetic energy that this adds, over the mass `[m^2/s^2]`.

@@ -125,10 +125,16 @@ impl<L: Lever> Batch<L> {
         one.over(largest).store(&mut self.compliance_t);
     }
 
-    /// One round of the two lines for each point; returns whether all are open and stay so.
+    /// One round of the two lines for each point; returns whether all are open and stay so, or no impulse has changed by
+    /// more than `idle`^2.
     #[inline(always)]
     #[allow(unsafe_code)]
-    fn solve<W: Width>(&mut self, bodies: &SharedBodies<'_>, sums: &mut Sums<W>) -> bool {
+    fn solve<W: Width>(
+        &mut self,
+        bodies: &SharedBodies<'_>,
+        idle: Reg<W>,
+        sums: &mut Sums<W>,
+    ) -> bool {
         let zero = Reg::<W>::splat(0.0);
         // SAFETY: the indices are of bodies that `BatchesOf` has taken over, and nobody else has them.
         let ([mut v_i, mut s_i], [mut v_j, mut s_j]) =
@@ -153,14 +159,15 @@ impl<L: Lever> Batch<L> {
         s_i = s_i + self.lever_i.turn(change);
         v_j = v_j.minus(Reg::load(&self.moves_j), change);
         s_j = s_j - self.lever_j.turn(change);
-        sums.add(change.dot(change), closing, normal);
+        let square = change.dot(change);
+        sums.add(square, closing, normal);
         new.store(&mut self.impulse);
         // SAFETY: as above; no two lanes share a body but the resting one, which gets what it has.
         unsafe {
             bodies.scatter::<W>(self.used, &self.i, v_i, s_i);
             bodies.scatter::<W>(self.used, &self.j, v_j, s_j);
         }
-        false
+        W::less_bits(idle.0, square.0) == 0
     }
 }
 
@@ -184,28 +191,23 @@ widest! {
 }
 
 widest! {
-    /// Solves the points of those batches once that are open, or those that are not, or both.
+    /// Solves the points of those batches once that are idle, or those that are not, or both: those are idle that stay open
+    /// or change by no more than `idle` `[m/s]`.
     pub(super) fn sweep<W, L: Lever>(
         batches: &mut [Batch<L>],
-        is_open: &mut [bool],
+        is_idle: &mut [bool],
         asked: [bool; 2],
         bodies: &SharedBodies<'_>,
         backwards: bool,
+        idle: f64,
     ) -> Progress {
+        let idle = Reg::splat(idle * idle);
         let mut sums = Sums::<W>::default();
-        let mut solve = |batch: &mut Batch<L>, is_open: &mut bool| {
-            if asked[usize::from(*is_open)] {
-                *is_open = batch.solve(bodies, &mut sums);
-            }
-        };
-        let all = batches.iter_mut().zip(is_open);
-        if backwards {
-            for (batch, is_open) in all.rev() {
-                solve(batch, is_open);
-            }
-        } else {
-            for (batch, is_open) in all {
-                solve(batch, is_open);
+        let count = batches.len();
+        for place in 0..count {
+            let number = if backwards { count - 1 - place } else { place };
+            if asked[usize::from(is_idle[number])] {
+                is_idle[number] = batches[number].solve(bodies, idle, &mut sums);
             }
         }
         sums.progress()

@@ -43,6 +43,19 @@ impl RigidBody {
         UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k))
     }
 
+    /// `[rad/s]`
+    pub fn angular_velocity(&self, solid: &Solid) -> Vector3<f64> {
+        let momentum = Vector3::from(self.momentum);
+        if turns_alike(&solid.inertia) {
+            return momentum / solid.inertia.x;
+        }
+        self.pose().inverse_inertia(&solid.inertia) * momentum
+    }
+
+    fn pose(&self) -> Pose {
+        Pose::new(self.centre.into(), self.turned())
+    }
+
     /// Kinetic energy over the mass `[m^2/s^2]`.
     pub fn kinetic_energy(&self, solid: &Solid) -> f64 {
         let momentum = self.turned().inverse() * Vector3::from(self.momentum);
@@ -72,7 +85,7 @@ pub(super) struct Moving {
 
 impl Moving {
     pub fn of(body: &RigidBody, solid: &Solid) -> Self {
-        let pose = Pose::new(body.centre.into(), body.turned());
+        let pose = body.pose();
         let inverse_inertia = pose.inverse_inertia(&solid.inertia);
         let omega = inverse_inertia * Vector3::from(body.momentum);
         Self {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use crate::turning::inverse_inertia;
+use crate::turning::{inverse_inertia, turns_alike};
 
 /// Where a body is and how it is turned.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +28,9 @@ impl Pose {
 
     /// The inverse of the tensor of inertia over the mass, in the scene's axes, from its moments about the body's.
     pub fn inverse_inertia(&self, moments: &Vector3<f64>) -> Matrix3<f64> {
+        if turns_alike(moments) {
+            return Matrix3::from_diagonal_element(1.0 / moments.x);
+        }
         inverse_inertia(&self.axes, moments)
     }
 }

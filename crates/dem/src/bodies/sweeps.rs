@@ -26,7 +26,8 @@ use granulcal_scene::Solid;
 /// Colours that a body's mask can distinguish; points beyond them get a batch of their own.
 const COLOURS: usize = 63;
 
-/// Batches that a sweep has left open are asked again in every so many sweeps, and before the end.
+/// Batches that a sweep has left open, or as good as it found them, are asked again in every so many sweeps, and before
+/// the end.
 const WHOLE: usize = 3;
 
 /// When the sweeps over all points of a substep end: the rule of spheres (`solver/nsgs.rs`).
@@ -40,6 +41,8 @@ pub(crate) struct Sweeps {
     pub settled: f64,
     /// Fastest that a point may close beyond what its gap allows `[m/s]`.
     pub closing: f64,
+    /// Change of an impulse at which its batch goes on in every sweep, not in every so many only `[m/s]`.
+    pub idle: f64,
 }
 
 /// What sweeps have come to.
@@ -215,14 +218,16 @@ impl<L: Lever> BatchesOf<L> {
         let mut settled = Settled { sweeps: 0, residual: 0.0, unconverged };
         let mut has_settled = false;
         let bodies = SharedBodies::new(&mut self.bodies);
-        let mut is_open = vec![false; batches.len()];
+        let mut is_idle = vec![false; batches.len()];
+        let mut ask =
+            |asked, backwards| sweep(batches, &mut is_idle, asked, &bodies, backwards, rule.idle);
         for sweeps in 1..=if unconverged { rule.most } else { 0 } {
             let backwards = sweeps % 2 == 0;
             let is_whole = sweeps % WHOLE == 1;
-            let mut worst = sweep(batches, &mut is_open, [true, is_whole], &bodies, backwards);
+            let mut worst = ask([true, is_whole], backwards);
             let is_enough = has_settled || sweeps >= rule.least;
             if is_enough && worst.closing <= rule.closing && !is_whole {
-                worst = worst.and(sweep(batches, &mut is_open, [false, true], &bodies, backwards));
+                worst = worst.and(ask([false, true], backwards));
             }
             settled.sweeps = sweeps;
             settled.residual = worst.residual();
@@ -230,7 +235,7 @@ impl<L: Lever> BatchesOf<L> {
                 settled.unconverged = false;
                 break;
             }
-            has_settled = worst.change <= rule.settled;
+            has_settled = is_whole && worst.change <= rule.settled;
         }
         settled
     }

@@ -78,13 +78,14 @@ impl Simulation {
         let (around, watch) = (&self.around, &mut self.watch);
         let (settings, radius) = (&around.settings, around.radius);
         let (dt, scale) = (settings.dt, radius / settings.dt);
-        let quiet = (settings.quiet_sweeps, QUIET_SETTLED * around.gravity.norm() * dt);
-        let (asked, still) = if self.is_quiet { quiet } else { (0, 0.0) };
+        let still = QUIET_SETTLED * around.gravity.norm() * dt;
+        let (asked, enough) = if self.is_quiet { (settings.quiet_sweeps, still) } else { (0, 0.0) };
         let sweeps = Sweeps {
             least: settings.sweeps.max(asked),
             most: settings.max_sweeps,
-            settled: still.max(settings.settled * scale),
+            settled: enough.max(settings.settled * scale),
             closing: settings.closing * scale,
+            idle: still,
         };
         let step = bodies.step(&around.gravity, &around.walls, &around.material, dt, sweeps);
         watch.see_penetration(step.deepest / radius);
