@@ -1,10 +1,11 @@
 //! Rows to Parquet and back.
 //!
-//! The columns are listed once, in `columns.rs`; writing, reading and checking walk that list.
+//! The columns are listed once, in `columns.rs`; writing, reading and checking walk that list. What a file says beside
+//! its rows is in `metadata.rs`.
 
 mod columns;
+mod metadata;
 
-use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,7 +15,7 @@ use granulcal_features::stats::DIAGNOSTIC_COUNT;
 use parquet::basic::Compression;
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{KeyValue, RowGroupMetaData};
+use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
@@ -27,22 +28,9 @@ use crate::header::{FIRST_ARITHMETIC, Header};
 use crate::row::{Row, RowStatus};
 use crate::{DatasetError, Form, files};
 use columns::{Access, Column, columns};
+use metadata::Metadata;
 
-/// Keys of the file's metadata.
-const SCENE_KEY: &str = "granulcal.scene";
-const PRIOR_KEY: &str = "granulcal.prior";
-const VERSION_KEY: &str = "granulcal.version";
-const LAW_KEY: &str = "granulcal.law";
-const ARITHMETIC_KEY: &str = "granulcal.arithmetic";
-const SEED_KEY: &str = "granulcal.seed";
-/// Units of the columns, for who reads the file by other means: TOML, a unit a column. Files of before it have none.
-const UNITS_KEY: &str = "granulcal.units";
-const HASH_KEY: &str = "granulcal.hash";
-/// Of a file of several row groups: the hash of each, as if it were a file of its own, separated by spaces.
-const HASHES_KEY: &str = "granulcal.hashes";
-/// Of the same: the rows that the data set was asked to have, where that is known.
-const ROWS_KEY: &str = "granulcal.rows";
-/// Rows of a group of such a file.
+/// Rows of a group of a file of several.
 const GROUP: usize = if cfg!(test) { 4 } else { 16_384 };
 /// Bytes that one byte of a packed column may become: a column of one value packs well.
 const MOST_PACKED: i64 = 4096;
@@ -119,8 +107,8 @@ fn hash(header: &Header, rows: &[Row], columns: &[Column]) -> String {
 
 fn encode(header: &Header, rows: &[Row], columns: &[Column]) -> Result<Vec<u8>, ParquetError> {
     let mut bytes = Vec::new();
-    let stated = (HASH_KEY, hash(header, rows, columns));
-    let mut file = writer(&mut bytes, header, Some(stated), columns)?;
+    let hash = hash(header, rows, columns);
+    let mut file = writer(&mut bytes, header, Some(hash), columns)?;
     write_group(&mut file, rows, columns)?;
     file.close()?;
     Ok(bytes)
@@ -130,29 +118,15 @@ fn encode(header: &Header, rows: &[Row], columns: &[Column]) -> Result<Vec<u8>, 
 fn writer<W: io::Write + Send>(
     out: W,
     header: &Header,
-    hash: Option<(&'static str, String)>,
+    hash: Option<String>,
     columns: &[Column],
 ) -> Result<SerializedFileWriter<W>, ParquetError> {
     let fields = columns.iter().map(|c| c.schema().map(Arc::new)).collect::<Result<Vec<_>, _>>()?;
     let schema = Arc::new(Type::group_type_builder("granulcal").with_fields(fields).build()?);
-    let law = header.law.map(|law| (LAW_KEY, law.to_string()));
-    let metadata = [
-        (SCENE_KEY, header.scene_toml.clone()),
-        (PRIOR_KEY, header.prior_toml.clone()),
-        (VERSION_KEY, header.version.clone()),
-        (ARITHMETIC_KEY, header.arithmetic.to_string()),
-        (SEED_KEY, header.seed.to_string()),
-    ];
-    let units: BTreeMap<&str, &str> =
-        columns.iter().filter_map(|column| Some((column.name.as_str(), column.unit?))).collect();
-    let units = toml::to_string(&units).map_err(|error| ParquetError::External(error.into()))?;
-    let units = (!units.is_empty()).then_some((UNITS_KEY, units));
-    let metadata = metadata.into_iter().chain(units).chain(hash).chain(law);
-    let metadata = metadata.map(|(key, value)| KeyValue::new(key.to_owned(), value));
     let properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
         .set_created_by(format!("granulcal {}", header.version))
-        .set_key_value_metadata(Some(metadata.collect()))
+        .set_key_value_metadata(Some(metadata::entries(header, columns, hash)?))
         .build();
     SerializedFileWriter::new(out, schema, Arc::new(properties))
 }
@@ -238,10 +212,8 @@ impl GroupWriter {
         if !self.rows.is_empty() || self.hashes.is_empty() {
             self.end_group()?;
         }
-        let hashes = self.hashes.join(" ");
-        let asked = asked.map(|rows| (ROWS_KEY, rows.to_string()));
-        for (key, value) in [(HASHES_KEY, hashes)].into_iter().chain(asked) {
-            self.file.append_key_value_metadata(KeyValue::new(key.to_owned(), value));
+        for entry in metadata::last_entries(&self.hashes, asked) {
+            self.file.append_key_value_metadata(entry);
         }
         self.file.into_inner().map_err(unwritten(&self.path))?.commit()
     }
@@ -264,10 +236,8 @@ pub(crate) fn parse(path: &Path, bytes: Vec<u8>) -> Result<Table, DatasetError> 
         .unwrap_or_else(|| Err(ParquetError::General("the metadata cannot be read".to_owned())))
         .map_err(parquet)?;
     check_ranges(path, &file, length)?;
-    let header = read_header(path, &file)?;
-    let asked = metadata(&file, ROWS_KEY);
-    let asked = asked.map(|rows| rows.parse().map_err(|_| no_number(path, ROWS_KEY, &rows)));
-    let asked = asked.transpose()?;
+    let metadata = Metadata::of(path, &file);
+    let (header, asked) = (metadata.header()?, metadata.asked()?);
     let observed = header.observed();
     let mut columns = columns(&header.prior.names(), &observed);
     // Files without the diagnostic statistics end before them; they stay NaN.
@@ -311,8 +281,8 @@ pub(crate) fn parse(path: &Path, bytes: Vec<u8>) -> Result<Table, DatasetError> 
             }
         }
     }
-    let stated = metadata(&file, HASH_KEY).or_else(|| metadata(&file, HASHES_KEY));
-    if let Some(stated) = &stated {
+    let stated = metadata.hashes();
+    if let Some(stated) = stated {
         let groups = file.metadata().row_groups();
         let mut rest = &rows[..];
         let mut found = Vec::new();
@@ -324,18 +294,12 @@ pub(crate) fn parse(path: &Path, bytes: Vec<u8>) -> Result<Table, DatasetError> 
             found.push(hash(&header, rows, &columns));
         }
         let found = found.join(" ");
-        if *stated != found {
-            let (path, stated) = (path.to_owned(), stated.clone());
+        if stated != found {
+            let (path, stated) = (path.to_owned(), stated.to_owned());
             return Err(DatasetError::Damaged { path, what: "the rows", found, stated });
         }
     }
     Ok(Table { header, rows, is_verified: stated.is_some(), asked })
-}
-
-/// The value of a key in the file's metadata.
-fn metadata(file: &SerializedFileReader<bytes::Bytes>, key: &str) -> Option<String> {
-    let all = file.metadata().file_metadata().key_value_metadata();
-    all.and_then(|all| all.iter().find(|entry| entry.key == key))?.value.clone()
 }
 
 /// A row that says nothing.
@@ -392,34 +356,6 @@ fn read_values<T: parquet::data_type::DataType>(
         reader.read_records(count, None, None, &mut values)?;
     }
     Ok(values)
-}
-
-fn read_header(
-    path: &Path,
-    file: &SerializedFileReader<bytes::Bytes>,
-) -> Result<Header, DatasetError> {
-    let value = |key: &str| {
-        metadata(file, key).ok_or_else(|| {
-            let what = format!("metadata {key}");
-            DatasetError::content(path, what, "none", "given, as granulcal-cli generate writes it")
-        })
-    };
-    let wrong = |key, found: &str| no_number(path, key, found);
-    let seed = value(SEED_KEY)?;
-    let seed = seed.parse().map_err(|_| wrong(SEED_KEY, &seed))?;
-    let law = metadata(file, LAW_KEY);
-    let law = law.map(|law| law.parse().map_err(|_| wrong(LAW_KEY, &law))).transpose()?;
-    let arithmetic = metadata(file, ARITHMETIC_KEY).map_or(Ok(FIRST_ARITHMETIC), |number| {
-        number.parse().map_err(|_| wrong(ARITHMETIC_KEY, &number))
-    })?;
-    let (scene, prior, version) = (value(SCENE_KEY)?, value(PRIOR_KEY)?, value(VERSION_KEY)?);
-    Header::parse(path, &scene, &prior, version, (law, arithmetic), seed)
-}
-
-/// The error of a key that must have a number.
-fn no_number(path: &Path, key: &str, found: &str) -> DatasetError {
-    let (what, found) = (format!("metadata {key}"), format!("{found:?}"));
-    DatasetError::content(path, what, found, "a whole number")
 }
 
 /// Refuses columns that lie outside of the file: the reader takes their places for granted, and panics.
