@@ -52,8 +52,9 @@ const LEAST_POINTS: usize = 3;
 ///
 /// # Errors
 /// `IncompleteColour` when only one of image and range is given, `SizeMismatch` when camera, depth
-/// and colour differ in size, `NoValidDepth`, `TooSmall` on the ground for `ground_resolution`, `DegeneratePlane`, `TooSteep` for a ground beyond
-/// `max_tilt_deg`, `EmptyMask`, `OutOfRange` for a setting.
+/// and colour differ in size, `NoValidDepth`, `TooSmall` on the ground for `ground_resolution`,
+/// `DegeneratePlane`, `TooSteep` for a ground beyond `max_tilt_deg`, `EmptyMask`, `OutOfRange` for a
+/// setting.
 pub fn segment_depth(
     camera: &Camera,
     image: &DepthImage,

@@ -18,7 +18,8 @@ impl Scene {
     /// Refuses what cannot be with something else that is there.
     ///
     /// # Errors
-    /// [`SceneError::Exclude`] and [`SceneError::Needs`] name both; [`SceneError::OutOfRange`] and [`SceneError::BadShape`] what is wrong with one.
+    /// [`SceneError::Exclude`] and [`SceneError::Needs`] name both; [`SceneError::OutOfRange`] and
+    /// [`SceneError::BadShape`] what is wrong with one.
     pub(crate) fn check_together(&self) -> Result<(), SceneError> {
         self.check_rolled_away()?;
         self.check_sizes()?;

@@ -19,8 +19,8 @@ const SAMPLES: usize = 8;
 const NARROWINGS: usize = 24;
 const GOLDEN: f64 = 0.618_033_988_749_895;
 
-/// Adds the points of body `i` at all rims that are nearer than `range` `[m]` at `now` `[s]` into the substep: one in each part of the circle, so that a
-/// face that lies on a rim has two or more. Returns whether any may be so near.
+/// Adds the points of body `i` at all rims that are nearer than `range` `[m]` at `now` `[s]` into the substep: one in
+/// each part of the circle, so that a face that lies on a rim has two or more. Returns whether any may be so near.
 pub(super) fn at_rims(
     around: &Around<'_>,
     body: &Pose,

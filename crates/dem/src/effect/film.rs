@@ -1,4 +1,4 @@
-//! A fluid film between surfaces that come near: `scene/effects/lubrication.rs` has its law.
+//! A fluid film between surfaces that come near: `crates/scene/src/effects/lubrication.rs` has its law.
 //!
 //! The force is `-C v_n / h` at an opening speed v_n, with C over the pair's mass and the gap cut at h_0. Along the way
 //! of a substep that is `dv = -C dh / h`, hence, whatever the way and the step,

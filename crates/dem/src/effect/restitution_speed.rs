@@ -1,4 +1,4 @@
-//! Restitution that depends on the speed of an impact: `scene/effects/restitution_speed.rs`.
+//! Restitution that depends on the speed of an impact: `crates/scene/src/effects/restitution_speed.rs`.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! A rolling resistance that grows with the speed of rolling: `scene/effects/rolling_form.rs`.
+//! A rolling resistance that grows with the speed of rolling: `crates/scene/src/effects/rolling_form.rs`.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! A table that is not level turns gravity: `scene/effects/tilt.rs`.
+//! A table that is not level turns gravity: `crates/scene/src/effects/tilt.rs`.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! A table that shakes adds to gravity: `scene/effects/vibration.rs`.
+//! A table that shakes adds to gravity: `crates/scene/src/effects/vibration.rs`.
 
 use std::sync::Arc;
 
