@@ -186,6 +186,13 @@ class LinearisedSurrogate:
         means = self._means(np.tile(v, (2, 1)), np.stack([low, high]))
         return (means[1] - means[0]) / (high[k] - low[k])
 
+    def directions(self, v: Array, k: int, psi: Array | None = None) -> tuple[Array, Array]:
+        """Returns the directions of effect k to `FAINT` and to `PLAIN`; two-sided: one for both."""
+        faint = self.direction(v, k, psi)
+        if self.surrogate.design.effects[k].is_two_sided:
+            return faint, faint
+        return faint, self.direction(v, k, psi, PLAIN)
+
     def _span(self, k: int, to: float = FAINT) -> tuple[float, float]:
         """Strengths between which an effect has its direction."""
         return (-FAINT, FAINT) if self.surrogate.design.effects[k].is_two_sided else (0.0, to)

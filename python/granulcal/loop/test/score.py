@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.surrogate.baseline import Fit
-from granulcal.loop.surrogate.linearised import FAINT, PLAIN, LinearisedSurrogate
+from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 
 __all__ = ["Scores", "families"]
 
@@ -73,11 +73,11 @@ class Scores:
         """Returns the scores of `effects` beyond a fit."""
         design = local.surrogate.design
         whiten = np.asarray(np.linalg.inv(fit.root), dtype=np.float64)
+        # Without effects one that is cut off again, for the shape.
+        nothing = np.zeros(local.size)
+        found = [local.directions(fit.v, k, fit.psi) for k in effects] or [(nothing, nothing)]
         directions, stronger = (
-            np.column_stack(
-                [local.direction(fit.v, k, fit.psi, to) for k in effects] or [np.zeros(local.size)]
-            )[:, : len(effects)]
-            for to in (FAINT, PLAIN)
+            np.column_stack(columns)[:, : len(effects)] for columns in zip(*found, strict=True)
         )
         gap = local.conditions[:, None] - local.conditions[None]
         kernel = np.exp(-0.5 * np.sum(gap**2, axis=2) / DISCREPANCY_LENGTH**2)
