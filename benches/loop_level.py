@@ -16,13 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.effects.design import Design, Effect, normal_from_cube
-from granulcal.loop.surrogate.baseline import fit_base
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
-from granulcal.loop.test.residual_test import residual_test
-from granulcal.loop.test.score import Scores
+from granulcal.loop.test.base_test import base_test
+from granulcal.loop.test.thresholds import Thresholds
 
 Array = NDArray[np.float64]
 
@@ -33,6 +32,7 @@ SIZES = ((300, 40, 3), (700, 80, 3), (1500, 150, 3), (1500, 150, 10))
 NOISE = 0.15
 ARCHIVES = 10
 LEVELS = (0.05, 0.01)
+RULES = Thresholds(replicates=1000, refits=16)
 
 
 class Truth:
@@ -111,10 +111,7 @@ def p_values(
                     rows = truth.pours(where, none, random)
                     seen.append(ConditionPours.of(str(at), [at], rows))
                 stack = StackedMeans.of(surrogate, seen)
-            local, fit = fit_base(surrogate, stack, number)
-            scores = Scores.of(local, fit, design.candidates)
-            test = residual_test(local, fit, scores, replicates=1000, refits=16, seed=number)
-            found.append(test.p)
+            found.append(base_test(surrogate, stack, RULES, number).test.p)
             inner.append(bool(np.abs(theta - 0.5).max() < 0.4))
     return np.array(found), np.array(inner), float(np.mean(ratios))
 

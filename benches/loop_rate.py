@@ -35,12 +35,10 @@ from granulcal.loop.effects.library import by_name
 from granulcal.loop.pours.archive import Archive
 from granulcal.loop.pours.cube import from_cube
 from granulcal.loop.pours.forward import Forward
-from granulcal.loop.surrogate.baseline import fit_base
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED
-from granulcal.loop.test.residual_test import residual_test
-from granulcal.loop.test.score import Scores
+from granulcal.loop.test.base_test import base_test
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import power
 from granulcal.loop.test.verdict import NAMING
@@ -361,13 +359,8 @@ def _p_of_base(out: Path, name: str, known: Surrogate, store: Archive, rules: Th
     task = gc.Task.load(out / "sets" / name / "loop.toml")
     forward = Forward(out / name / "pours", 1)
     analysis = Analysis(task, store.plan, forward, rules, 0, lambda line: None)
-    measured = {c.name: c.statistics(task.scene) for c in analysis.fitted}
-    stack = StackedMeans.of(known, analysis.observed(measured))
-    local, fit = fit_base(known, stack, 0, ())
-    scores = Scores.of(local, fit, known.design.candidates)
-    return residual_test(
-        local, fit, scores, replicates=rules.replicates, refits=rules.refits, seed=0
-    ).p
+    stack = StackedMeans.of(known, analysis.observed(analysis.measured()))
+    return base_test(known, stack, rules).test.p
 
 
 def rate(what: str, hits: list[bool]) -> None:

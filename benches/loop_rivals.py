@@ -114,8 +114,7 @@ def why(out: Path, names: list[str]) -> None:
         store = Archive(out / "archive", plan)
         fitted = fit_surrogate(store, seed=0) if fitted is None else fitted
         analysis = Analysis(task, store.plan, Forward(out / "pours", 1), rules, 0, print)
-        measured = {c.name: c.statistics(task.scene) for c in analysis.fitted}
-        found = trace(fitted, analysis.observed(measured), rules, seed=0)
+        found = trace(fitted, analysis.observed(analysis.measured()), rules, seed=0)
         print(f"{name}: {found.verdict.kind} {', '.join(found.verdict.named)}")
         half = float(np.log(np.diag(found.base_fit.root)).sum())
         reached = {rival.one.effects: rival for rival in within_reach(found, rules)}

@@ -3,7 +3,8 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.forward import Forward
@@ -12,6 +13,8 @@ from granulcal.loop.task import FIT, Condition, Task
 from granulcal.loop.test.thresholds import Thresholds
 
 __all__ = ["Analysis"]
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,10 @@ class Analysis:
     def fitted(self) -> tuple[Condition, ...]:
         """Conditions to fit."""
         return self.task.of(FIT)
+
+    def measured(self) -> dict[str, Array]:
+        """Returns the statistics of the recordings of every condition to fit, by its name."""
+        return {c.name: c.statistics(self.task.scene) for c in self.fitted}
 
     def pours(self, condition: Condition, rows: ArrayLike) -> ConditionPours:
         """Returns rows of statistics (n, s) as pours of a condition."""

@@ -172,7 +172,7 @@ def close_loop(
     sights = power(surrogate, middle, units, counts, sessions)
     say(_power_table(sights))
 
-    measured = {c.name: c.statistics(task.scene) for c in analysis.fitted}
+    measured = analysis.measured()
     observed = analysis.observed(measured)
     found = trace(surrogate, observed, rules, seed=seed)
     say(f"the fits say {found.verdict.kind}: {found.verdict.reason}")

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.loop.effects.design import Design, cube_from_normal, normal_from_cube
-from granulcal.loop.surrogate.baseline import Fit, Start, fit_base
+from granulcal.loop.surrogate.baseline import Fit, Start
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
+from granulcal.loop.test.base_test import base_test
 from granulcal.loop.test.detectable import detectable, distances
 from granulcal.loop.test.refit import Model, by_probability, fit_none, fit_pair, fit_single
 from granulcal.loop.test.residual_test import ResidualTest, residual_test
@@ -245,11 +246,8 @@ def trace(
     design = surrogate.design
     stack = StackedMeans.of(surrogate, observations)
     target = stack.means.ravel()
-    local, fit = fit_base(surrogate, stack, seed, starts)
-    scores = Scores.of(local, fit, design.candidates)
-    test = residual_test(
-        local, fit, scores, replicates=rules.replicates, refits=rules.refits, seed=seed
-    )
+    base = base_test(surrogate, stack, rules, seed, starts)
+    local, fit, scores, test = base.local, base.fit, base.scores, base.test
     none = fit_none(fit, rules)
     tested: list[tuple[Model, float]] = []
     if test.p <= rules.name and design.candidates:
