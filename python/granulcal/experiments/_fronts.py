@@ -136,11 +136,15 @@ def _draw(path: Path, closed: Closed, forward: Forward) -> None:
                 label = f"measured{of}" if number == 0 else None
                 axis.plot(times, row[columns], f"k.{line}", lw=0.8, label=label)
         axis.set_title(f"{condition.name} ({'fitted' if condition.use == FIT else condition.use})")
-    for axis in axes[(len(conditions) - 1) // _COLUMNS]:
+    for axis in axes.flat[max(len(conditions) - _COLUMNS, 0) : len(conditions)]:
         axis.set_xlabel("time [s]")
+        # The last of its column, though panels that are not used stand below it.
+        axis.tick_params(labelbottom=True)
     for axis in axes[:, 0]:
         axis.set_ylabel("radius of the front [mm]")
-    axes.flat[0].legend(fontsize=8, loc="upper left")
+    # Above all panels: within one it may cover what is drawn there.
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, fontsize=8, loc="outside upper center", ncols=len(fronts))
     figure.savefig(path, dpi=80)
     plt.close(figure)
 

@@ -118,7 +118,7 @@ def poured(data: Path) -> list[PourKind]:
 
 
 def reproduce(out: Path, data: Path) -> bool:
-    """Runs the loop; report.html and verdict.json in `out`/loop_column.
+    """Runs the loop; report.html, verdict.json and fronts.png in `out`/loop_column.
 
     Returns whether the verdict stands.
     """
