@@ -36,6 +36,7 @@ from granulcal.loop.check.checks import (
     nearer,
     trivial,
 )
+from granulcal.loop.check.fit_rounds import fit_rounds
 from granulcal.loop.check.look_again import look_again
 from granulcal.loop.check.own_errors import as_recorded
 from granulcal.loop.check.prior_rounds import ROUNDS, drawn, prior_rounds
@@ -49,20 +50,18 @@ from granulcal.loop.experiment import next_experiment
 from granulcal.loop.pours.archive import Archive, ArchivePlan, require_same
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
-from granulcal.loop.pours.refine import ROUND, further
+from granulcal.loop.pours.refine import ROUND
 from granulcal.loop.pours.replicates import (
     REPLICATES,
     both,
     error_of,
     placebo_of,
 )
-from granulcal.loop.pours.rows import Rows
 from granulcal.loop.pours.time_needed import time_needed
 from granulcal.loop.preregistration import register
 from granulcal.loop.report.folder import write_report
 from granulcal.loop.report.models_of import models_of
 from granulcal.loop.surrogate.condition_pours import session_numbers
-from granulcal.loop.surrogate.conditioned import conditioned
 from granulcal.loop.surrogate.store_surrogate import fit_surrogate
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Task
@@ -177,19 +176,8 @@ def close_loop(
     found = trace(surrogate, observed, rules, seed=seed)
     say(f"the fits say {found.verdict.kind}: {found.verdict.reason}")
 
-    rounded = 0
-    for number in range(rounds):
-        if found.residual_test.p > rules.name:
-            break
-        parts = further(analysis, found, number)
-        if not parts:
-            break
-        more = Rows.joined(parts)
-        rounded += len(more)
-        surrogate = conditioned(surrogate, more)
-        found = trace(surrogate, observed, rules, seed=seed)
-        say(f"after pours where the fits are, {found.verdict.kind}: {found.verdict.reason}")
-    beside = rival_rounds(analysis, surrogate, found, observed)
+    near = fit_rounds(analysis, surrogate, found, observed, rounds)
+    beside = rival_rounds(analysis, near.surrogate, near.trace, observed)
     seen = prior_rounds(analysis, beside.surrogate, beside.trace, observed, measured)
     begin = () if seen.best is None else seen.best.starts(analysis.plan.design)
     again = rival_rounds(
@@ -268,7 +256,7 @@ def close_loop(
         experiments=tuple(experiments),
         pours=plan.pours
         + _needed(task, pairs if wide is not None else 0, draws)
-        + rounded
+        + near.pours
         + beside.pours
         + again.pours
         + settled.before
