@@ -4,10 +4,8 @@ Rolling and spinning friction are lengths [m], mu R_eff; restitution is Newton's
 smaller coefficient counts, so a grain's mu_r R / 2 decides at walls too.
 """
 
-import json
-
 from granulcal.export.mark import signed
-from granulcal.export.mesh import triangles
+from granulcal.export.places import places
 from granulcal.export.setup import Contact, Setup
 
 __all__ = ["ENGINE", "NOTES", "UNEQUAL", "material", "notes", "scene"]
@@ -63,16 +61,6 @@ def material(setup: Setup, young: float | None = None) -> str:
 
 def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
     """Returns the files of a pour: `python pour.py` leaves grains.csv."""
-    walls = [
-        {"vertices": mesh.vertices.tolist(), "faces": mesh.faces.tolist()}
-        for mesh in (triangles(body.shape) for body in setup.walls)
-    ]
-    table = {
-        "file": signed(setup.name, ENGINE),
-        "centres": setup.centres.tolist(),
-        "radii": setup.radii.tolist(),
-        "walls": walls,
-    }
     laws = "".join(
         _lines(f"wall_{i}", body.law, setup.smallest) for i, body in enumerate(setup.walls)
     )
@@ -127,4 +115,4 @@ with open("grains.csv", "w") as out:
         at = body.GetPos()
         out.write("%.9g,%.9g,%.9g,%.9g\\n" % (at.x, at.y, at.z, radius))
 """
-    return {"pour.py": script, "pour.json": json.dumps(table)}
+    return {"pour.py": script, "pour.json": places(setup, ENGINE)}

@@ -5,10 +5,8 @@ the ground carries 2 mu_r R - mu_r R / 2 = 1.5 mu_r R for a pair limit of mu_r R
 e, of two shapes the mean, where `enable_restitution` is on.
 """
 
-import json
-
 from granulcal.export.mark import signed
-from granulcal.export.mesh import triangles
+from granulcal.export.places import places
 from granulcal.export.setup import Contact, Setup
 
 __all__ = ["ENGINE", "NOTES", "UNEQUAL", "material", "notes", "scene"]
@@ -76,16 +74,6 @@ def material(setup: Setup, young: float | None = None) -> str:
 
 def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
     """Returns the files of a pour: `python pour.py` leaves grains.csv."""
-    walls = [
-        {"vertices": mesh.vertices.tolist(), "faces": mesh.faces.tolist()}
-        for mesh in (triangles(body.shape) for body in setup.walls)
-    ]
-    table = {
-        "file": signed(setup.name, ENGINE),
-        "centres": setup.centres.tolist(),
-        "radii": setup.radii.tolist(),
-        "walls": walls,
-    }
     own, wide = setup.effective_radius, setup.smallest
     laws = _config("ground", setup.ground, wide, 0.0, setup.grains, own)
     laws += "".join(
@@ -130,4 +118,4 @@ while time < {setup.horizon:g}:
 out = np.column_stack([one.body_q.numpy()[:, :3], table["radii"]])
 np.savetxt("grains.csv", out, delimiter=",", header="x,y,z,radius", comments="", fmt="%.9g")
 """
-    return {"pour.py": script, "pour.json": json.dumps(table)}
+    return {"pour.py": script, "pour.json": places(setup, ENGINE)}
