@@ -257,14 +257,8 @@ def stand(
         weighed=tuple(weighed),
     )
     if verdict.kind in NAMING and found.unbeaten:
-        said = Verdict(
-            verdict.kind,
-            verdict.named,
-            verdict.families,
-            verdict.p,
-            f"{verdict.reason}; at the sealed conditions {found.beside('it')}",
-        )
-        return replace(found, verdict=said)
+        reason = f"{verdict.reason}; at the sealed conditions {found.beside('it')}"
+        return replace(found, verdict=replace(verdict, reason=reason))
     return found
 
 

@@ -61,7 +61,9 @@ Array = NDArray[np.float64]
 
 MODELS = ("base", "named", "corrected", "line", "nearest")
 """What may predict."""
-_WITHOUT_PHYSICS = ("corrected", "line", "nearest")
+_ROWS = ("line", "nearest")
+"""Those that pour nothing."""
+_WITHOUT_PHYSICS = ("corrected", *_ROWS)
 
 _NAME = "models.json"
 # Seeds of pours, apart from those of the archive and of the replicates.
@@ -176,7 +178,8 @@ class Models:
         data = read_bytes(path, most=LARGEST_DOCUMENT)
         d = parse_json(data, path, error=ObservationError)
         check_models(d, path)
-        today = Scene.from_toml(d["scene"]).native.law
+        scene = Scene.from_toml(d["scene"])
+        today = scene.native.law
         if d.get("law") not in (0, today):
             warnings.warn(
                 f"{path} is of another law of the solver than today's {today}: what it "
@@ -185,7 +188,6 @@ class Models:
                 stacklevel=2,
             )
         inputs = tuple((str(p), float(a), float(b)) for p, a, b in d["inputs"])
-        scene = Scene.from_toml(d["scene"])
         # What the conditions share is the scene's, and older files do not say it again.
         beside = [path for path in d["paths"] if path not in [p for p, _, _ in inputs]]
         known = np.array(d["known"], dtype=float).reshape(len(d["means"]), len(inputs))
@@ -254,7 +256,7 @@ class Models:
             require_stated(model, at, known)
             require_shared(model, at, self.shared)
         self.require_engine(model)
-        if model in ("line", "nearest"):
+        if model in _ROWS:
             require_near(model, self._unit(at), self.known)
             return self._row(model, self._unit(at), level)
         if pours < FEWEST:
@@ -276,7 +278,7 @@ class Models:
         """
         used = engine_in_use()
         name = None if used is None else used.name
-        if model in ("line", "nearest") or name == self.engine or (self.engine == "" and name):
+        if model in _ROWS or name == self.engine or (self.engine == "" and name):
             return
         was, now = (
             "another engine" if each == "" else "our own simulator" if each is None else repr(each)
@@ -307,7 +309,7 @@ class Models:
             model: one of `MODELS`.
             at: numbers that are asked for in place of the fit's.
         """
-        if model in ("line", "nearest"):
+        if model in _ROWS:
             return {"numbers": {}, "effects": {}, "strengths": {}, "is_named": False}
         has = self.added() if model == "named" else {}
         numbers = self.makers["named" if model == "named" else "base"][0].numbers
@@ -325,7 +327,7 @@ class Models:
             model: one of `MODELS`.
             at: numbers that are asked for in place of the fit's.
         """
-        if model in ("line", "nearest"):
+        if model in _ROWS:
             return "no physics: the measured means of the conditions to fit"
         has = self.added() if model == "named" else {}
         if not has:
@@ -369,11 +371,10 @@ class Models:
             model: one of `MODELS`.
             at: numbers that the condition states.
         """
-        if model in ("line", "nearest"):
+        if model in _ROWS:
             return []
         maker = self.makers["base" if model == "corrected" else model][0]
-        there = {path: value + maker.shifts.get(path, 0.0) for path, value in at.items()}
-        scene = self.scene.with_({**maker.numbers, **there})
+        scene = self._scene(maker, at)
         if self.coarse is None:
             return [scene]
         return [scene, scene.with_(self.coarse.numbers)] * self.coarse.repeats
@@ -381,12 +382,15 @@ class Models:
     def _unit(self, at: Mapping[str, float]) -> Array:
         return np.array([(at[p] - low) / (high - low) for p, low, high in self.inputs])
 
+    def _scene(self, maker: Maker, at: Mapping[str, float]) -> Scene:
+        """The scene of a pour under a condition, at its own size of grains."""
+        there = {path: value + maker.shifts.get(path, 0.0) for path, value in at.items()}
+        return self.scene.with_({**maker.numbers, **there})
+
     def _pours(
         self, maker: Maker, at: Mapping[str, float], seeds: Sequence[int], forward: Forward
     ) -> Array:
-        there = {path: value + maker.shifts.get(path, 0.0) for path, value in at.items()}
-        scene = self.scene.with_({**maker.numbers, **there})
-        return forward.limit(scene, seeds, maker.faults, self.coarse)
+        return forward.limit(self._scene(maker, at), seeds, maker.faults, self.coarse)
 
     def _of_rows(
         self, model: str, rows: Array, level: float, pours: int | None = None
