@@ -101,6 +101,11 @@ class Design:
         """Indices of the declared tolerances."""
         return tuple(k for k, effect in enumerate(self.effects) if effect.nuisance_sd is not None)
 
+    @property
+    def bends(self) -> NDArray[np.bool_]:
+        """Whether the square of each effect is learnt: of all that are not held, shape (K,)."""
+        return np.array([effect.held is None for effect in self.effects], dtype=bool)
+
     def none(self) -> Array:
         """Returns strengths without any effect but those that are held, shape (K,)."""
         return np.array([effect.held or 0.0 for effect in self.effects], dtype=np.float64)

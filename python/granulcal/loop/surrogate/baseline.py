@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.effects.design import LARGEST_Z
+from granulcal.loop.effects.design import LARGEST_Z, cube_from_normal
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
@@ -181,8 +181,6 @@ def _starts(surrogate: Surrogate, stack: StackedMeans, seed: int) -> list[Array]
     v = np.random.default_rng(seed).standard_normal((_STARTS, p))
     v[0] = 0.0
     count = len(stack.conditions)
-    from granulcal.loop.effects.design import cube_from_normal
-
     theta = np.repeat(cube_from_normal(v), count, axis=0)
     rows = np.tile(stack.conditions, (_STARTS, 1))
     none = np.zeros((len(rows), effects))

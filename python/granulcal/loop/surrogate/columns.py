@@ -18,6 +18,7 @@ __all__ = [
     "curve_width",
     "curved_columns",
     "curved_effects",
+    "effect_columns",
     "fold_curve",
     "held_residuals",
     "lack_of_fit",
@@ -120,7 +121,7 @@ def mean_columns(
         inputs: q.
         curved: effects that have a curve, and whether it is two-sided.
     """
-    first, second = _effect_columns(u)
+    first, second = effect_columns(u)
     main = basis(u)
     widths = [main.shape[1] - basis.size, basis.size]
     parts = [main]
@@ -211,8 +212,8 @@ def crossed_effects(psi: Array) -> tuple[tuple[int, int], ...]:
     return tuple((int(k), int(other)) for k, other in np.argwhere(many >= _CROSSED_ROWS))
 
 
-def _effect_columns(u: Array) -> tuple[Array, Array]:
-    """Prior-scaled monomials of g_k and of h_k."""
+def effect_columns(u: Array) -> tuple[Array, Array]:
+    """Returns prior-scaled monomials of g_k and of h_k, shape (n, any) each."""
     centred = 2 * u - 1
     dimension = u.shape[1]
     scales = np.full((dimension + 1) * (dimension + 2) // 2, _CURVATURE)

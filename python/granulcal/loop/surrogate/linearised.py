@@ -203,13 +203,19 @@ class LinearisedSurrogate:
 
     def pour_covariance(self, v: Array, psi: Array) -> Array:
         """Returns the covariance of the means of pours, shape (H m, H m)."""
-        scale = self._scales(v, psi) / np.sqrt(self.counts)[:, None]
+        scale = self.scales(v, psi) / np.sqrt(self.counts)[:, None]
         size = self.surrogate.size
         total = np.zeros((self.size, self.size))
         for h, correlation in enumerate(self.correlations):
             part = slice(h * size, (h + 1) * size)
             total[part, part] = correlation * np.outer(scale[h], scale[h])
         return total
+
+    def scales(self, v: Array, psi: Array) -> Array:
+        """Returns the scale of a pour's noise on each axis under each condition, shape (H, m)."""
+        count = len(self.conditions)
+        theta = np.tile(cube_from_normal(v), (count, 1))
+        return self.surrogate.scale(theta, self.conditions, np.tile(psi, (count, 1)))
 
     def error_covariance(self, v: Array, psi: Array) -> Array:
         """Returns U, what the features cannot follow and an anchor's noise, (H m, H m)."""
@@ -219,7 +225,7 @@ class LinearisedSurrogate:
             total += shift @ shift.T
         else:
             total = self._base_error.copy()
-        lack = self.surrogate.lack * self._scales(v, psi) ** 2
+        lack = self.surrogate.lack * self.scales(v, psi) ** 2
         total[np.diag_indices_from(total)] += lack.ravel()
         if self.surrogate.anchor is not None:
             theta = cube_from_normal(v)
@@ -282,11 +288,6 @@ class LinearisedSurrogate:
         rows = np.tile(conditions, (len(v), 1))
         strengths = np.repeat(psi, count, axis=0)
         return self.surrogate.mean(theta, rows, strengths).reshape(len(v), -1)
-
-    def _scales(self, v: Array, psi: Array) -> Array:
-        count = len(self.conditions)
-        theta = np.tile(cube_from_normal(v), (count, 1))
-        return self.surrogate.scale(theta, self.conditions, np.tile(psi, (count, 1)))
 
 
 def _curve_roots(surrogate: Surrogate, u: Array, k: int) -> Array:

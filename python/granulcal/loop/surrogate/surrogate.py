@@ -48,12 +48,12 @@ from granulcal.loop.effects.design import Design
 from granulcal.loop.surrogate.anchor import Anchor
 from granulcal.loop.surrogate.blocks import fit_blocks
 from granulcal.loop.surrogate.columns import (
-    _effect_columns,
     crossed_columns,
     crossed_effects,
     curve_width,
     curved_columns,
     curved_effects,
+    effect_columns,
     held_residuals,
     lack_of_fit,
     mean_columns,
@@ -224,11 +224,10 @@ class Surrogate:
             on = psi_[:, k] != 0
             moved[on] += psi_[on, k, None] * shift.move(u[on], k)
         z = z - moved
-        bent = np.array([effect.held is None for effect in design.effects], dtype=bool)
         crossed, curved = crossed_effects(psi_), curved_effects(design, psi_)
         inputs = condition_.shape[1]
-        design_matrix, blocks = mean_columns(basis, u, psi_, bent, crossed, inputs, curved)
-        scale_matrix = scale_columns(scale_basis, u, psi_, bent)
+        design_matrix, blocks = mean_columns(basis, u, psi_, design.bends, crossed, inputs, curved)
+        scale_matrix = scale_columns(scale_basis, u, psi_, design.bends)
         coefficients = np.empty((size, design_matrix.shape[1]))
         roots = np.empty((size, design_matrix.shape[1], design_matrix.shape[1]))
         scale_coefficients = np.empty((size, scale_matrix.shape[1]))
@@ -340,23 +339,18 @@ class Surrogate:
     def features(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns the features at rows of (theta, condition, psi), shape (n, d)."""
         u, inputs = np.column_stack([theta, condition]), condition.shape[1]
-        of = self._bent, self.crossed, inputs, self.curved
+        of = self.design.bends, self.crossed, inputs, self.curved
         return mean_columns(self.basis, u, psi, *of)[0]
-
-    @property
-    def _bent(self) -> NDArray[np.bool_]:
-        """Effects whose square was learnt, shape (K,)."""
-        return np.array([effect.held is None for effect in self.design.effects], dtype=bool)
 
     def effect_features(self, theta: Array, condition: Array, k: int) -> tuple[Array, Array]:
         """Returns features of psi_k and of psi_k^2 at rows of (theta, condition), each (n, d)."""
         u = np.column_stack([theta, condition])
-        first, second = _effect_columns(u)
+        first, second = effect_columns(u)
         width, step = self.basis(u[:1]).shape[1], first.shape[1] + second.shape[1]
         start = width + k * step
         linear, square = np.zeros((2, len(u), self.coefficients.shape[1]))
         linear[:, start : start + first.shape[1]] = first
-        if self._bent[k]:
+        if self.design.bends[k]:
             square[:, start + first.shape[1] : start + step] = second
         return linear, square
 
@@ -375,11 +369,11 @@ class Surrogate:
         active = np.nonzero(psi.any(axis=0))[0]
         if len(active) == 0:
             return total
-        first, second = _effect_columns(u)
+        first, second = effect_columns(u)
         step = first.shape[1] + second.shape[1]
         for k in active:
             strength, start = psi[:, k : k + 1], width + k * step
-            bend = strength**2 if self._bent[k] else 0.0 * strength
+            bend = strength**2 if self.design.bends[k] else 0.0 * strength
             columns = np.concatenate([strength * first, bend * second], axis=1)
             total += columns @ self.coefficients[:, start : start + step].T
             curve = self.coefficients[:, self.curve(int(k))]
@@ -431,7 +425,7 @@ class Surrogate:
     def scale(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns s at rows of (theta, condition, psi), shape (n, m)."""
         u = np.column_stack([theta, condition])
-        features = scale_columns(self.scale_basis, u, psi, self._bent)
+        features = scale_columns(self.scale_basis, u, psi, self.design.bends)
         return np.exp(features @ self.scale_coefficients.T)
 
     def weights_near(self, theta: Array, condition: Array, width: float) -> Array:

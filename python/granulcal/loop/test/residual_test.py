@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.loop.effects.design import cube_from_normal
 from granulcal.loop.surrogate.baseline import Fit, improve
 from granulcal.loop.surrogate.linearised import NEAR, LinearisedSurrogate
 from granulcal.loop.test.score import Scores
@@ -29,7 +30,7 @@ __all__ = ["ResidualTest", "draw_errors", "residual_test"]
 
 Array = NDArray[np.float64]
 
-# Bartlett factors beyond this say that the linear picture does not hold; they are kept as they are.
+# Added to the diagonal of a covariance that may be singular.
 _JITTER = 1e-9
 
 
@@ -108,8 +109,8 @@ def draw_errors(
 ) -> Array:
     """Returns stacked deviations of mean pours from the surrogate's mean, shape (count, H m)."""
     surrogate, size = local.surrogate, local.surrogate.size
-    scales = local._scales(fit.v, fit.psi)
-    theta = _theta(fit)
+    scales = local.scales(fit.v, fit.psi)
+    theta = cube_from_normal(fit.v)
     parts = []
     for h, condition in enumerate(local.conditions):
         near = surrogate.weights_near(theta, condition, NEAR) * surrogate.is_donor
@@ -125,12 +126,6 @@ def draw_errors(
     shared[np.diag_indices_from(shared)] += _JITTER
     root = np.linalg.cholesky(shared)
     return errors + generator.standard_normal((count, len(local.conditions) * size)) @ root.T
-
-
-def _theta(fit: Fit) -> Array:
-    from granulcal.loop.effects.design import cube_from_normal
-
-    return cube_from_normal(fit.v)
 
 
 def _statistics(scores: Scores, residuals: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.loop.effects.design import Design, cube_from_normal, normal_from_cube
-from granulcal.loop.surrogate.baseline import Fit, Start
+from granulcal.loop.surrogate.baseline import Fit, Start, summarise
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.surrogate.stacked_means import StackedMeans
@@ -336,8 +336,6 @@ def _families(design: Design, scores: Scores) -> tuple[tuple[str, ...], ...]:
 
 def fit_at(local: LinearisedSurrogate, v: Array) -> Fit:
     """Returns the fit of data that are the surrogate's mean at `v` (p,)."""
-    from granulcal.loop.surrogate.baseline import summarise
-
     return summarise(local, local.mean(v, local.none()), v, local.none(), ())
 
 
