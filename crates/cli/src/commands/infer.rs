@@ -1,13 +1,14 @@
 //! `infer`: recordings to the posterior of a trained model, and whether the model can say anything of them.
 
 mod report;
+mod seen;
 
 use std::path::Path;
 
 use anyhow::Context as _;
 use clap::Args;
 use granulcal_bayessim::Model;
-use granulcal_dataset::{Form, Limits, Product, Recording, Room, scene_from_text, write_file};
+use granulcal_dataset::{Form, Limits, Product, Room, scene_from_text, write_file};
 use granulcal_dem::{LAW, law_of};
 use granulcal_features::PAPER16;
 use granulcal_scene::Scene;
@@ -17,12 +18,12 @@ use crate::args::ReadArgs;
 use crate::args::numbers::seed;
 use crate::args::paths::{Reads, Writes, recording, writes};
 use crate::context::{note, print_json};
-use crate::edge::pixels_at_edge;
 use crate::outcome::{BadArgument, Outcome};
 use crate::run::{Run, Setting};
 use crate::scene;
 use crate::sides::SideFiles;
 use report::Report;
+use seen::{Reading, Seen};
 
 /// Draws in the file of `--out`.
 const KEPT_DRAWS: usize = 1000;
@@ -112,44 +113,14 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
         None => None,
     };
     let camera = trained.map(|scene| scene.camera);
-    require_different(&args.recordings)?;
-    let (mut is_whole, mut impossible, mut doubts) = (true, Vec::new(), Vec::new());
-    let mut observed = Vec::with_capacity(args.recordings.len());
-    for path in &args.recordings {
-        let recording = Recording::open(path, &args.read.options())?;
-        for line in &recording.damage {
-            note(&format!("warning: {line}"));
-        }
-        if let Some(lost) = &recording.lost {
-            note(&format!("warning: {}: {lost}", path.display()));
-            is_whole = false;
-        }
-        doubts
-            .extend(recording.unlike.iter().map(|unlike| format!("{}: {unlike}", path.display())));
-        let own = &recording.segmentation;
-        let mut segmentation =
-            camera.as_ref().map_or_else(|| own.clone(), |camera| own.as_seen_by(camera));
-        segmentation.border_px = args.border.unwrap_or(segmentation.border_px);
-        let formation = recording.formation_with(&segmentation)?;
-        if args.border.is_none() {
-            // Before the limits: these pixels may be why the extent cannot be the scene's.
-            let edge = pixels_at_edge(&formation);
-            doubts.extend(edge.map(|edge| format!("{}: {edge}", path.display())));
-        }
-        if let Some(limits) = &limits {
-            let name = path.display();
-            let of_it = |reason| format!("{name}: {reason}");
-            impossible.extend(limits.violations(&formation).into_iter().map(of_it));
-            doubts.extend(limits.doubts_of(&recording, &formation).into_iter().map(of_it));
-        }
-        observed.push(match recording.statistics_of(&formation) {
-            Ok(statistics) => chosen.iter().map(|&at| statistics[at]).collect(),
-            // What cannot be of the scene need not be described.
-            Err(_) if !impossible.is_empty() => Vec::new(),
-            Err(error) => return Err(error.into()),
-        });
-    }
-    require_no_copies(&observed)?;
+    let reading = Reading {
+        options: args.read.options(),
+        border: args.border,
+        camera: camera.as_ref(),
+        limits: limits.as_ref(),
+        chosen: &chosen,
+    };
+    let Seen { observed, impossible, doubts, is_whole } = Seen::of(&args.recordings, &reading)?;
     let paths: Vec<_> = args.recordings.iter().map(|path| path.display().to_string()).collect();
     for doubt in &doubts {
         note(&format!("warning: {doubt}"));
@@ -199,35 +170,6 @@ fn places(names: &[String]) -> Result<Vec<usize>, BadArgument> {
         unknown.join(", ")
     );
     Err(BadArgument(refusal))
-}
-
-/// Refuses a recording that is given twice: it would count as two pours.
-fn require_different(recordings: &[Reads]) -> anyhow::Result<()> {
-    let mut seen = std::collections::HashSet::new();
-    for path in recordings {
-        let there = std::fs::canonicalize(&**path).unwrap_or_else(|_| path.to_path_buf());
-        if !seen.insert(there) {
-            let refusal =
-                format!("each recording must be given once, got {} twice", path.display());
-            return Err(BadArgument(refusal).into());
-        }
-    }
-    Ok(())
-}
-
-/// Refuses copies of a recording under other names: no two pours agree to the last digit of all statistics.
-fn require_no_copies(observed: &[Vec<f64>]) -> anyhow::Result<()> {
-    for (second, row) in observed.iter().enumerate().filter(|(_, row)| !row.is_empty()) {
-        if let Some(first) = observed[..second].iter().position(|other| other == row) {
-            let refusal = format!(
-                "recordings {} and {} show one formation, to the last digit of all statistics: each pour counts once",
-                first + 1,
-                second + 1
-            );
-            return Err(BadArgument(refusal).into());
-        }
-    }
-    Ok(())
 }
 
 /// Refuses a model of another scene.
