@@ -28,6 +28,7 @@ from granulcal.warned import warn
 if TYPE_CHECKING:
     from granulcal.bayessim.training.sequential import SequentialFit
     from granulcal.measured.recording import Recording
+    from granulcal.prior import Prior
 
 __all__ = ["add"]
 
@@ -114,8 +115,25 @@ def _run(options: argparse.Namespace) -> int:
             engine=engine,
             ray=cluster_of(options),
         )
+    document = _document(options, prior, found, [*unlike, *doubtful])
+    # What has been found is printed, whatever becomes of the file.
+    lost: OSError | None = None
+    try:
+        write_beside(options.out / "posterior.json", json.dumps(document, indent=1) + "\n")
+    except OSError as error:
+        lost = error
+    code = _say(options, found, document, recordings, assumed(scene.to_toml(), prior))
+    if lost is not None:
+        raise lost
+    return code
+
+
+def _document(
+    options: argparse.Namespace, prior: "Prior", found: "SequentialFit", told: list[str]
+) -> dict[str, Any]:
+    """Returns what was found, for JSON; `told` are the doubts about the recordings."""
     posterior = found.posterior
-    document = {
+    return {
         "recordings": [str(path) for path in options.recording],
         "parameters": parameters_of(posterior),
         "fixed": dict(prior.fixed),
@@ -128,19 +146,9 @@ def _run(options: argparse.Namespace) -> int:
         "pours": len(found.x),
         "usable": found.rounds[-1].usable,
         "left_out": found.left_out.to_dict(),
-        "warnings": [*unlike, *doubtful, *map(str, posterior.warnings)],
+        "warnings": [*told, *map(str, posterior.warnings)],
         "samples": posterior.sample(_SAMPLES).tolist(),
     }
-    # What has been found is printed, whatever becomes of the file.
-    lost: OSError | None = None
-    try:
-        write_beside(options.out / "posterior.json", json.dumps(document, indent=1) + "\n")
-    except OSError as error:
-        lost = error
-    code = _say(options, found, document, recordings, assumed(scene.to_toml(), prior))
-    if lost is not None:
-        raise lost
-    return code
 
 
 def _say(
