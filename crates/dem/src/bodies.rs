@@ -243,9 +243,7 @@ impl Bodies {
             Around { solid: &solid, corners, walls, material, dt, may_close, small: &small };
         let (points, neighbours) = (std::mem::take(&mut self.points), &mut self.neighbours);
         let mut contacts = collide::contacts(&around, &moving, neighbours, points);
-        let mut step = Step::default();
-        let depths = contacts.points.iter().map(|point| -point.gap);
-        step.deepest = depths.fold(0.0, f64::max);
+        let mut step = Step { deepest: contacts.deepest, ..Step::default() };
         for round in 1..=ROUNDS {
             let (impacts, work) = impact::resolve(
                 (contacts.manifolds.all_mut(), &contacts.points),
@@ -278,13 +276,16 @@ impl Bodies {
             }
             contacts.carry_from(known, &moving);
         }
-        self.batches.put_back(&mut contacts.points);
+        self.known.clear();
+        self.batches.put_back(&mut contacts.points, |point| self.known.keep(point));
         let points = contacts.points;
         step.points = points.len();
+        if sorted < points.len() {
+            self.known.sort();
+        }
         let at_walls = points[..sorted].iter().take_while(|point| point.j().is_none());
         let work = at_walls.chain(&points[sorted..]).map(Point::work_of_wall);
         step.work_of_walls += work.sum::<f64>();
-        self.known.take(&points, sorted);
         self.points = points;
         self.all = moving.iter().map(|body| body.moved(&solid, dt)).collect();
         step

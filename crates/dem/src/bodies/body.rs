@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::pose::Pose;
-use crate::turning::{inverse_inertia, turned_on, turns_alike};
+use crate::turning::{inverse_inertia, turn_by, turned_on, turns_alike};
 use granulcal_scene::Solid;
 
 /// Place and motion.
@@ -47,7 +47,7 @@ impl RigidBody {
     pub fn angular_velocity(&self, solid: &Solid) -> Vector3<f64> {
         let momentum = Vector3::from(self.momentum);
         if turns_alike(&solid.inertia) {
-            return momentum / solid.inertia.x;
+            return 1.0 / solid.inertia.x * momentum;
         }
         self.pose().inverse_inertia(&solid.inertia) * momentum
     }
@@ -103,7 +103,7 @@ impl Moving {
     /// Where it is at the end of a substep if nothing more meets it.
     pub fn foreseen(&self, dt: f64) -> Pose {
         let (goes, turns) = self.way(dt);
-        Pose::new(self.pose.centre + goes, UnitQuaternion::new(turns) * self.pose.turned)
+        Pose::new(self.pose.centre + goes, turn_by(&turns) * self.pose.turned)
     }
 
     /// How far it goes within `dt` `[m]`, and turns `[rad]`.

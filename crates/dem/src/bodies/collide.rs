@@ -34,6 +34,8 @@ pub(super) struct Contacts {
     pub points: Vec<Point>,
     /// Of the points in that order.
     pub manifolds: Manifolds,
+    /// Deepest overlap at the begin of the substep `[m]`.
+    pub deepest: f64,
 }
 
 /// Every point of contact that the next substep may close, as far as it can be seen where the bodies are.
@@ -47,7 +49,7 @@ pub(super) fn contacts(
     points.clear();
     let motions: Vec<_> = bodies.iter().map(|body| Motion::of(body, around.solid.reach)).collect();
     let mut clear_of_walls = Vec::with_capacity(bodies.len());
-    let mut manifolds = Manifolds::default();
+    let (mut manifolds, mut deepest) = (Manifolds::default(), 0.0);
     for (i, Moving { pose, .. }) in bodies.iter().enumerate() {
         let first = points.len();
         let range = around.range(&motions[i], None) + around.way_of_walls(&pose.centre);
@@ -55,6 +57,7 @@ pub(super) fn contacts(
         clear_of_walls.push(if is_near { f64::NEG_INFINITY } else { range });
         points[first..].sort_by_key(Point::name);
         manifolds.add(&points[first..]);
+        deepest = depth_of(&points[first..], deepest);
     }
     let mut pairs = neighbours.near(around, bodies, &motions);
     let mut near = Vec::new();
@@ -79,10 +82,16 @@ pub(super) fn contacts(
             let first = points.len();
             meeting.points(around, &asked[number], |point| points.push(point));
             manifolds.add(&points[first..]);
+            deepest = depth_of(&points[first..], deepest);
         },
     );
     let (examined, corrected) = (Vec::new(), Vec::new());
-    Contacts { pairs, motions, clear_of_walls, examined, corrected, points, manifolds }
+    Contacts { pairs, motions, clear_of_walls, examined, corrected, points, manifolds, deepest }
+}
+
+/// The deepest overlap of the points, `least` at least `[m]`.
+fn depth_of(points: &[Point], least: f64) -> f64 {
+    points.iter().map(|point| -point.gap).fold(least, f64::max)
 }
 
 /// Gives, for each pair that may be as near as asked, its number and where it meets.

@@ -35,6 +35,9 @@ impl Contacts {
         let (reach, dt) = (around.solid.reach, around.dt);
         let ways: Vec<_> = bodies.iter().map(|body| Way::of(body, reach, dt)).collect();
         let is_other = self.examine(around, &ways);
+        if !is_other.contains(&true) {
+            return false;
+        }
         let least = FORESEEN * around.least();
         // What is no deeper than sweeps leave a point is none yet.
         let range = -around.may_close;

@@ -61,14 +61,20 @@ impl Marks {
         }
     }
 
-    /// Keeps the impulses of the points, those before `sorted` in the order of their names, in this order.
-    pub fn take(&mut self, points: &[Point], sorted: usize) {
+    /// Forgets all.
+    pub fn clear(&mut self) {
         self.0.clear();
-        let acting = points.iter().filter(|point| point.impulse != Vector3::zeros());
-        let mark = |point: &Point| (point.name(), point.mark.into(), point.impulse.into());
-        self.0.extend(acting.map(mark));
-        if sorted < points.len() {
-            self.0.sort_by_key(|mark| mark.0);
+    }
+
+    /// Keeps the impulse of a point, if it has one, behind the others.
+    pub fn keep(&mut self, point: &Point) {
+        if point.impulse != Vector3::zeros() {
+            self.0.push((point.name(), point.mark.into(), point.impulse.into()));
         }
+    }
+
+    /// Puts them in the order of their manifolds.
+    pub fn sort(&mut self) {
+        self.0.sort_by_key(|mark| mark.0);
     }
 }

@@ -88,11 +88,11 @@ impl Batches {
         }
     }
 
-    /// Gives the points the impulses that they have come to.
-    pub fn put_back(&self, points: &mut [Point]) {
+    /// Gives each point the impulse that it has come to, and then to `take`.
+    pub fn put_back(&self, points: &mut [Point], take: impl FnMut(&Point)) {
         match self {
-            Self::Round(batches) => batches.put_back(points),
-            Self::Other(batches) => batches.put_back(points),
+            Self::Round(batches) => batches.put_back(points, take),
+            Self::Other(batches) => batches.put_back(points, take),
         }
     }
 }
@@ -240,10 +240,11 @@ impl<L: Lever> BatchesOf<L> {
         settled
     }
 
-    /// Hands the impulses to the points.
-    fn put_back(&self, points: &mut [Point]) {
+    /// Hands the impulses to the points, and these on.
+    fn put_back(&self, points: &mut [Point], mut take: impl FnMut(&Point)) {
         for (&(batch, lane), point) in self.places.iter().zip(points) {
             point.impulse = self.all[batch as usize].impulse(lane as usize);
+            take(point);
         }
     }
 
