@@ -44,6 +44,7 @@ __all__ = [
     "Plane",
     "Recording",
     "SegmentationSettings",
+    "UnlikeFramesWarning",
 ]
 
 Array = NDArray[np.float64]
