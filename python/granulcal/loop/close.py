@@ -36,11 +36,10 @@ from granulcal.loop.check.checks import (
     nearer,
     trivial,
 )
-from granulcal.loop.check.fit_rounds import fit_rounds
+from granulcal.loop.check.learning import learning
 from granulcal.loop.check.look_again import look_again
 from granulcal.loop.check.own_errors import as_recorded
-from granulcal.loop.check.prior_rounds import ROUNDS, drawn, prior_rounds
-from granulcal.loop.check.rival_rounds import rival_rounds
+from granulcal.loop.check.prior_rounds import ROUNDS, drawn
 from granulcal.loop.check.standing import stand
 from granulcal.loop.check.steady import drifts
 from granulcal.loop.check.unseen import seen_of, told_unseen
@@ -176,19 +175,13 @@ def close_loop(
     found = trace(surrogate, observed, rules, seed=seed)
     say(f"the fits say {found.verdict.kind}: {found.verdict.reason}")
 
-    near = fit_rounds(analysis, surrogate, found, observed, rounds)
-    beside = rival_rounds(analysis, near.surrogate, near.trace, observed)
-    seen = prior_rounds(analysis, beside.surrogate, beside.trace, observed, measured)
-    begin = () if seen.best is None else seen.best.starts(analysis.plan.design)
-    again = rival_rounds(
-        analysis, seen.surrogate, seen.trace, observed, beside.rounds, starts=begin
-    )
-    looked = look_again(analysis, again.surrogate, again.trace, observed, measured)
+    known = learning(analysis, surrogate, found, observed, measured, rounds)
+    looked = look_again(analysis, known.surrogate, known.trace, observed, measured)
     settled, there = looked.settled, looked.placed
     found, surrogate = settled.trace, settled.surrogate
     hidden = task.of(SEALED)
-    best, draws = seen.best, seen.draws
-    if found.best.effects != seen.trace.best.effects and rules.look:
+    best, draws = known.best, known.draws
+    if found.best.effects != known.drawn_of and rules.look:
         # The winner is another: no random draw of it has been poured.
         best, draws = drawn(analysis, surrogate, found, measured), draws + rules.look
     found, of_base, own = there.trace, there.of_base, there.own
@@ -256,9 +249,7 @@ def close_loop(
         experiments=tuple(experiments),
         pours=plan.pours
         + _needed(task, pairs if wide is not None else 0, draws)
-        + near.pours
-        + beside.pours
-        + again.pours
+        + known.pours
         + settled.before
         + there.pours
         + looked.pours,
