@@ -64,10 +64,11 @@ pub fn law_of(scene: &Scene) -> u32 {
 /// farther when points that are open were swept apart from those that push, and balls and clumps when pairs that pass each
 /// other were seen as far apart as they are at the end of a substep. Bodies came one farther again when they met where they
 /// lie at that time, and once more when two that are known to meet, and ways that lead into the same by more, were
-/// looked at no more, and when points that hardly change in a sweep were swept less often. Balls with a film between
-/// them came to 2 when Newton's steps told what it leaves of a speed, and clumps to 3 when the ends of their ways were
-/// looked at. Unequal balls came to 2 when contacts were solved to the least of them, and
-/// those that are parted to 3 when none went through a wall for it, and they were parted across the ends of a period.
+/// looked at no more; they came one farther still when points that hardly change in a sweep were swept less often and
+/// small turns went by their series. Balls with a film between them came to 2 when Newton's steps told what it leaves of a
+/// speed, and clumps to 3 when the ends of their ways were looked at. Unequal balls came to 2 when contacts were solved to
+/// the least of them, and those that are parted to 3 when none went through a wall for it, and they were parted across the
+/// ends of a period.
 pub fn arithmetic(scene: &Scene) -> u32 {
     let of_shape = match scene.grains.shape {
         Some(GrainShape::Box { .. } | GrainShape::Cylinder { .. }) => 12,

@@ -175,13 +175,15 @@ def close_loop(
     found = trace(surrogate, observed, rules, seed=seed)
     say(f"the fits say {found.verdict.kind}: {found.verdict.reason}")
 
-    known = learning(analysis, surrogate, found, observed, measured, rounds)
-    looked = look_again(analysis, known.surrogate, known.trace, observed, measured)
+    # By the same names: what was known before is let go.
+    found, surrogate, best, draws, drawn_of, learnt = learning(
+        analysis, surrogate, found, observed, measured, rounds
+    )
+    looked = look_again(analysis, surrogate, found, observed, measured)
     settled, there = looked.settled, looked.placed
     found, surrogate = settled.trace, settled.surrogate
     hidden = task.of(SEALED)
-    best, draws = known.best, known.draws
-    if found.best.effects != known.drawn_of and rules.look:
+    if found.best.effects != drawn_of and rules.look:
         # The winner is another: no random draw of it has been poured.
         best, draws = drawn(analysis, surrogate, found, measured), draws + rules.look
     found, of_base, own = there.trace, there.of_base, there.own
@@ -249,7 +251,7 @@ def close_loop(
         experiments=tuple(experiments),
         pours=plan.pours
         + _needed(task, pairs if wide is not None else 0, draws)
-        + known.pours
+        + learnt
         + settled.before
         + there.pours
         + looked.pours,
