@@ -1,0 +1,130 @@
+//! Impacts that threads work out ahead of their turn.
+//!
+//! What an impact does is decided by the grains that it looks at. As long as none of these has been hit since, and none
+//! has got a new partner, it does what was foretold; else it is worked out again. So impacts happen one after the other
+//! in the order of their times, with the same bits on any number of threads.
+
+use std::collections::HashMap;
+use std::sync::Mutex;
+
+use super::cluster::{Cluster, Collision};
+use super::event::Event;
+use crate::contact::Candidate;
+use crate::contact_context::ContactContext;
+use crate::contacts::Contacts;
+use crate::particles::Particles;
+use crate::partners::Partners;
+
+/// Impacts that are foretold at once, at most. The more, the more of them are overtaken by what others do before.
+pub(super) const MOST: usize = if cfg!(test) { 6 } else { 64 };
+/// Impacts to come below which threads are not worth their waiting for each other.
+pub(super) const FEW: usize = if cfg!(test) { 2 } else { 16 };
+
+/// An impact as the state was when it was foretold.
+#[derive(Clone, Debug)]
+pub(super) struct Foretold {
+    pair: Candidate,
+    /// `[s]` into the substep.
+    time: f64,
+    /// What it does, if the pair still closes fast enough.
+    collision: Option<Collision>,
+    /// The grains that it has looked at.
+    seen: Vec<u32>,
+    /// Partners that had been added to the list.
+    added: usize,
+}
+
+/// Clusters for impacts that are worked out at the same time.
+#[derive(Debug, Default)]
+pub(super) struct Room(Mutex<Vec<Cluster>>);
+
+impl Room {
+    /// Works out an impact as if it were the next.
+    pub fn foretell(
+        &self,
+        &Event { pair, time, .. }: &Event,
+        particles: &Particles,
+        contacts: &Contacts,
+        around: &ContactContext,
+    ) -> Foretold {
+        let clusters = || self.0.lock().expect("no thread has panicked");
+        let spare = clusters().pop();
+        let mut cluster = spare.unwrap_or_default();
+        let collision = cluster.collide(pair, time, particles, contacts, around);
+        let is_grain = |&seen: &u32| (seen as usize) < particles.count();
+        let seen = cluster.seen(contacts).filter(is_grain).collect();
+        clusters().push(cluster);
+        Foretold { pair, time, collision, seen, added: contacts.listing().added() }
+    }
+}
+
+impl Clone for Room {
+    /// Room is made when it is needed.
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+/// The foretold impacts of a substep, each with the impacts that the grains which it has looked at had had.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Ahead(HashMap<Candidate, (Foretold, Vec<u32>)>);
+
+impl Ahead {
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// Notes what was foretold when grains had had so many impacts.
+    pub fn extend(&mut self, foretold: Vec<Foretold>, counts: &[u32]) {
+        let with_counts = |foretold: Foretold| {
+            let had = foretold.seen.iter().map(|&grain| counts[grain as usize]).collect();
+            (foretold.pair, (foretold, had))
+        };
+        self.0.extend(foretold.into_iter().map(with_counts));
+    }
+
+    /// Whether what was foretold of an impact still holds.
+    pub fn holds(&self, event: &Event, counts: &[u32], listing: &Partners) -> bool {
+        self.0.get(&event.pair).is_some_and(|(foretold, had)| {
+            let as_then = |(&grain, &count): (&u32, &u32)| {
+                let grain = grain as usize;
+                counts[grain] == count && listing.has_all_since(grain, foretold.added)
+            };
+            foretold.time == event.time && foretold.seen.iter().zip(had).all(as_then)
+        })
+    }
+
+    /// What was foretold of an impact.
+    pub fn take(&mut self, event: &Event) -> Option<Collision> {
+        self.0.remove(&event.pair)?.0.collision
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_foretold_holds_until_a_grain_that_it_saw_is_hit_or_gets_a_partner() {
+        let pair = Candidate { i: 0, partner: 1 };
+        let event = |time| Event { time, pair, counts: [0; 2] };
+        let mut listing = Partners::default();
+        listing.rebuild(4, |add| add(0, 1));
+        listing.add(0, 3);
+        let mut counts = vec![0, 0, 2, 0];
+        let mut ahead = Ahead::default();
+        let foretold = Foretold { pair, time: 0.5, collision: None, seen: vec![0, 1, 2], added: 1 };
+        ahead.extend(vec![foretold], &counts);
+
+        assert!(ahead.holds(&event(0.5), &counts, &listing));
+        assert!(!ahead.holds(&event(0.4), &counts, &listing));
+        counts[3] += 1;
+        listing.add(3, 2);
+        assert!(ahead.holds(&event(0.5), &counts, &listing), "of a grain that it has not seen");
+        counts[2] += 1;
+        assert!(!ahead.holds(&event(0.5), &counts, &listing), "hit");
+        counts[2] -= 1;
+        listing.add(2, 3);
+        assert!(!ahead.holds(&event(0.5), &counts, &listing), "a new partner");
+    }
+}
