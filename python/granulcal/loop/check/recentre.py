@@ -156,14 +156,7 @@ def _without_error(local: LinearisedSurrogate) -> LinearisedSurrogate:
     """The surrogate's slopes and noise, its mean taken as known."""
     known = local.surrogate
     surrogate = replace(known, lack=np.zeros_like(known.lack), anchor=None)
-    return replace(
-        local,
-        surrogate=surrogate,
-        error_roots=np.zeros_like(local.error_roots),
-        crossed_roots=np.zeros_like(local.crossed_roots),
-        curve_roots=tuple(np.zeros_like(root) for root in local.curve_roots),
-        shift_roots=np.zeros_like(local.shift_roots),
-    )
+    return replace(local, surrogate=surrogate, is_known=True)
 
 
 def _cut_normal(

@@ -16,14 +16,16 @@ Reference:
     Tipping, Sparse Bayesian learning, JMLR 1, 2001 (one width for each block).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.surrogate.inverse import inverse_of
+from granulcal.loop.surrogate.bordered import Features, Gram
+from granulcal.loop.surrogate.bordering import Bordering
+from granulcal.loop.surrogate.roots import Root
 
-__all__ = ["BlockFit", "fit_blocks"]
+__all__ = ["BlockFit", "fit_blocks", "fit_bordered"]
 
 Array = NDArray[np.float64]
 
@@ -39,14 +41,14 @@ class BlockFit:
 
     Attributes:
         coefficients: shape (d,).
-        root: B with B B^T = A^-1, the posterior covariance of the coefficients, shape (d, d).
+        root: B with B B^T = A^-1, the posterior covariance of the coefficients.
         left_out: residual of each row under a fit to the others, shape (n,).
         noise: the same, of the scale of the noise alone, shape (n,).
         dof: rows less the coefficients that they decided.
     """
 
     coefficients: Array
-    root: Array
+    root: Root
     left_out: Array
     noise: Array
     dof: float
@@ -62,29 +64,39 @@ def fit_blocks(x: Array, y: Array, scale: Array, blocks: list[slice], gram: Arra
         blocks: columns of each block; together all of them.
         gram: x^T s^-2 x, which several targets may share, shape (d, d).
     """
-    weights = scale**-2
-    along = x.T @ (weights * y)
+    bordering = Bordering.none(x.shape[1])
+    features = Features(bordering, (), x / scale[:, None])
+    found = fit_bordered(features, y / scale, blocks, Gram(bordering, (), gram[:0], gram))
+    return replace(found, left_out=scale * found.left_out, noise=scale * found.noise)
+
+
+def fit_bordered(x: Features, y: Array, blocks: list[slice], gram: Gram) -> BlockFit:
+    """Returns the regression of `y` (n,) on features of which many never meet.
+
+    Args:
+        x: features; all s are 1.
+        y: target of spread about 1.
+        blocks: columns of each block; together all of them.
+        gram: x^T x, which several targets may share.
+    """
+    along = x.along(y)
     size = np.concatenate([np.full(b.stop - b.start, i) for i, b in enumerate(blocks)])
-    widths = np.ones(len(blocks))
-    variance = 0.3 * float(np.sum(weights * y**2)) / len(y)
-    inverse, c, known = np.empty_like(gram), np.empty(0), np.zeros(len(blocks))
+    widths, known = np.ones(len(blocks)), np.zeros(len(blocks))
+    variance = 0.3 * float(y @ y) / len(y)
+    root, c, left = None, along, y
     for _ in range(_ROUNDS):
-        precision = gram / variance
-        precision[np.diag_indices_from(precision)] += 1 / widths[size]
-        inverse = inverse_of(precision)
-        c = inverse @ (along / variance)
-        left = y - x @ c
-        spread = np.diag(inverse)
+        root = gram.root(variance, 1 / widths[size])
+        c = root.on(root.transposed_on(along / variance))
+        left = y - x.times(c)
+        spread = root.squares
         for i, block in enumerate(blocks):
             count = block.stop - block.start
             known[i] = max(count - float(spread[block].sum()) / widths[i], 1e-6)
             found = float(c[block] @ c[block]) / known[i]
             widths[i] = min(max(found, _SMALLEST), _LARGEST)
-        variance = float(np.sum(weights * left**2)) / max(len(y) - known.sum(), 1.0)
-    root = np.asarray(np.linalg.cholesky(inverse), dtype=np.float64)
-    leverage = np.sum((x @ root) ** 2, axis=1) * weights / variance
-    leverage = np.minimum(leverage, _LARGEST_LEVERAGE)
-    left = y - x @ c
+        variance = float(left @ left) / max(len(y) - known.sum(), 1.0)
+    assert root is not None
+    leverage = np.minimum(x.squares(root) / variance, _LARGEST_LEVERAGE)
     return BlockFit(
         c,
         root,

@@ -9,6 +9,7 @@ from granulcal.bayessim.emulator.basis import Basis, polynomial
 from granulcal.errors import TrainingDataError
 from granulcal.loop.effects.design import Design
 from granulcal.loop.surrogate.leading import LeadingBasis
+from granulcal.loop.surrogate.roots import Roots
 
 __all__ = [
     "CURVES",
@@ -56,7 +57,7 @@ def held_residuals(noise: Array) -> Array:
 
 
 def lack_of_fit(
-    basis: LeadingBasis, u: Array, features: Array, roots: Array, white: Array, scales: Array
+    basis: LeadingBasis, u: Array, features: Array, roots: Roots, white: Array, scales: Array
 ) -> Array:
     """Lambda of each axis; pairs are each of up to `_LACK_ROWS` rows with its nearest."""
     v = u * basis.rates
@@ -67,9 +68,10 @@ def lack_of_fit(
     held = np.clip(white, -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
     products = np.mean(held[chosen][:, None] * held[near], axis=(0, 1))
     shared = np.empty(len(products))
-    for j, root in enumerate(roots):
-        along = (features @ root) / scales[:, j : j + 1]
-        shared[j] = np.mean(np.einsum("ij,ikj->ik", along[chosen], along[near], optimize=True))
+    for j in range(len(roots)):
+        along = roots.times(features, j) / scales[:, j : j + 1]
+        each = [np.einsum("ij,ij->i", along[chosen], along[beside]) for beside in near.T]
+        shared[j] = np.mean(each)
     return np.maximum(products + shared, 0.0)
 
 

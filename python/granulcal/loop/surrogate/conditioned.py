@@ -11,8 +11,9 @@ $$ c' = c + B G^T K^{-1} r, \qquad B' B'^T = B (I - G^T K^{-1} G) B^T. $$
 
 It is the posterior of all pours with the widths of the coefficients' priors, the scales and the
 axes that the archive has decided: some 100 pours would hardly move these, and a fit anew takes as
-long as the first. Left-out residuals of the further pours, $K^{-1} r$ over its own diagonal of
-$K^{-1}$, join those of the archive.
+long as the first. Of $B'$ the few directions in which it is less than B are kept (`roots.py`).
+Left-out residuals of the further pours, $K^{-1} r$ over its own diagonal of $K^{-1}$, join those of
+the archive.
 
 Reference:
     Rasmussen and Williams, Gaussian processes for machine learning, 2006, sections 2.1 (weights)
@@ -25,7 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.pours.rows import Rows
+from granulcal.loop.surrogate.inverse import inverse_of
 from granulcal.loop.surrogate.linearised import NEAR
+from granulcal.loop.surrogate.roots import Change
 from granulcal.loop.surrogate.surrogate import DONOR_SHARE, Surrogate
 
 __all__ = ["conditioned"]
@@ -55,15 +58,15 @@ def conditioned(surrogate: Surrogate, rows: Rows) -> Surrogate:
     apart = np.sum((u[:, None, :] - u[None]) ** 2, axis=2)
     shared = np.exp(-0.5 * apart / NEAR**2)
     coefficients = surrogate.coefficients.copy()
-    roots: Array = np.empty(surrogate.roots.shape)
+    changes = []
     white, noise = np.empty(y.shape), np.empty(y.shape)
-    for j, root in enumerate(surrogate.roots):
-        along = (features / scale[:, j, None]) @ root
+    for j in range(surrogate.size):
+        along = surrogate.roots.times(features / scale[:, j, None], j)
         left = (y[:, j] - features @ coefficients[j]) / scale[:, j]
-        inverse = np.linalg.inv(along @ along.T + np.eye(len(u)) + surrogate.lack[j] * shared)
+        inverse = inverse_of(along @ along.T + np.eye(len(u)) + surrogate.lack[j] * shared)
         known = inverse @ left
-        coefficients[j] += root @ (along.T @ known)
-        roots[j] = _without(root, along, inverse)
+        coefficients[j] += surrogate.roots.on(along.T @ known, j)
+        changes.append(_told(along, inverse))
         own = np.diag(inverse)
         white[:, j], noise[:, j] = known / own, known / np.sqrt(own)
     low, high = surrogate.raw_range
@@ -71,7 +74,7 @@ def conditioned(surrogate: Surrogate, rows: Rows) -> Surrogate:
     return replace(
         surrogate,
         coefficients=coefficients,
-        roots=roots,
+        roots=surrogate.roots.after(changes),
         white=np.concatenate([surrogate.white, white]),
         noise=np.concatenate([surrogate.noise, noise]),
         rows=np.concatenate([surrogate.rows, u]),
@@ -82,8 +85,8 @@ def conditioned(surrogate: Surrogate, rows: Rows) -> Surrogate:
     )
 
 
-def _without(root: Array, along: Array, inverse: Array) -> Array:
-    """B (I - G^T K^-1 G)^(1/2) of B = `root`, G = `along`, K^-1 = `inverse`: few directions change.
+def _told(along: Array, inverse: Array) -> Change:
+    """What (I - G^T K^-1 G)^(1/2), G = `along`, takes from a root that it follows.
 
     With Q = G^T K^(-1/2) = U S V^T the square root is I - U (1 - (1 - S^2)^(1/2)) U^T.
     """
@@ -92,5 +95,4 @@ def _without(root: Array, along: Array, inverse: Array) -> Array:
     told = squares > _TOLD
     squares = np.minimum(squares[told], 1.0)
     directions = (along.T @ (half @ turns[:, told])) / np.sqrt(squares)
-    shrunk = 1 - np.sqrt(1 - squares)
-    return root - ((root @ directions) * shrunk) @ directions.T
+    return Change(directions, 1 - np.sqrt(1 - squares))

@@ -1,4 +1,4 @@
-"""The inverse of a precision matrix."""
+"""The inverse of a covariance or of a precision matrix."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ __all__ = ["inverse_of"]
 Array = NDArray[np.float64]
 
 
-def inverse_of(precision: Array) -> Array:
+def inverse_of(matrix: Array) -> Array:
     """Returns the inverse of a positive definite matrix (d, d).
 
     By LAPACK's potrf and potri, a quarter of the work by LU; numpy has no potri. SciPy's give the
@@ -18,12 +18,12 @@ def inverse_of(precision: Array) -> Array:
     """
     from scipy.linalg import get_lapack_funcs
 
-    potrf, potri = get_lapack_funcs(("potrf", "potri"), (precision,))
+    potrf, potri = get_lapack_funcs(("potrf", "potri"), (matrix,))
     # Once more: SciPy may have come just now.
     with one_thread():
-        factor, failed = potrf(precision, lower=1, clean=0)
+        factor, failed = potrf(matrix, lower=1, clean=0)
         lower, failed_too = potri(factor, lower=1)
     if failed or failed_too:
-        raise np.linalg.LinAlgError("the precision matrix is not positive definite")
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
     below = np.tril(lower, -1)
     return np.asarray(below + below.T + np.diag(np.diag(lower)), dtype=np.float64)

@@ -17,12 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.effects.design import cube_from_normal
-from granulcal.loop.surrogate.columns import (
-    CURVES,
-    crossed_columns,
-    curve_columns,
-    fold_curve,
-)
+from granulcal.loop.surrogate.mean_error import MeanError
 from granulcal.loop.surrogate.surrogate import Surrogate
 
 __all__ = ["LinearisedSurrogate"]
@@ -47,15 +42,10 @@ class LinearisedSurrogate:
         counts: pours of each condition, shape (H,).
         v: prior z-scores of the point around which this holds, shape (p,).
         correlations: R_h times the Hotelling factor, shape (H, m, m).
-        error_roots: of the mean's uncertainty: without effects, then for each effect the part that
-            psi multiplies and the part that psi^2 does, shape (1 + 2 K, H, m, d).
-        crossed_roots: of the part that the product of two strengths multiplies, for each two that
-            have one, shape (X, H, m, d).
-        curve_roots: of the part that each sine of a strength multiplies, for each effect, shape
-            (f, H, m, d), f = 0 without a curve.
-        shift_roots: of the shifts of theta that effects are in part, shape (K, H m, r).
+        mean_error: of the surrogate's mean, but for the shifts.
         own_errors: what a standard deviation of each declared nuisance does, shape (N, H, m).
         sessions: number of the session of each condition, shape (H,).
+        is_known: whether the surrogate's mean counts as known: U is 0.
     """
 
     surrogate: Surrogate
@@ -63,12 +53,10 @@ class LinearisedSurrogate:
     counts: Array
     v: Array
     correlations: Array
-    error_roots: Array
-    crossed_roots: Array
-    curve_roots: tuple[Array, ...]
-    shift_roots: Array
+    mean_error: MeanError
     own_errors: Array
     sessions: NDArray[np.int64]
+    is_known: bool = False
 
     @classmethod
     def at(
@@ -83,12 +71,6 @@ class LinearisedSurrogate:
         theta = cube_from_normal(v)
         count, size = len(conditions), surrogate.size
         rows = np.tile(theta, (count, 1))
-        effects = surrogate.design.effects
-        features = [surrogate.features(rows, conditions, np.zeros((count, len(effects))))]
-        for k in range(len(effects)):
-            features += surrogate.effect_features(rows, conditions, k)
-        stacked = np.stack(features, axis=1).reshape(-1, features[0].shape[1])
-        roots = np.stack([stacked @ root for root in surrogate.roots])
         dof = surrogate.dof * np.mean(~surrogate.is_donor)
         factor = dof / max(dof - size - 1, 1.0)
         correlations = np.stack(
@@ -110,22 +92,7 @@ class LinearisedSurrogate:
             counts,
             v,
             correlations,
-            np.ascontiguousarray(
-                roots.reshape(size, count, 1 + 2 * len(effects), -1).transpose(2, 1, 0, 3)
-            ),
-            _crossed_roots(surrogate, conditions),
-            tuple(
-                _curve_roots(surrogate, np.column_stack([rows, conditions]), k)
-                for k in range(len(effects))
-            ),
-            np.array(
-                [
-                    surrogate.shift.root(np.column_stack([rows, conditions]), k).reshape(
-                        count * size, -1
-                    )
-                    for k in range(len(effects))
-                ]
-            ),
+            MeanError(surrogate, rows, conditions),
             own_errors,
             np.arange(count) if sessions is None else sessions,
         )
@@ -219,12 +186,7 @@ class LinearisedSurrogate:
 
     def error_covariance(self, v: Array, psi: Array) -> Array:
         """Returns U, what the features cannot follow and an anchor's noise, (H m, H m)."""
-        if psi.any():
-            total = self._error(self.error_root(psi))
-            shift = np.tensordot(psi, self.shift_roots, axes=1)
-            total += shift @ shift.T
-        else:
-            total = self._base_error.copy()
+        total = self._mean_covariance(psi)
         lack = self.surrogate.lack * self.scales(v, psi) ** 2
         total[np.diag_indices_from(total)] += lack.ravel()
         if self.surrogate.anchor is not None:
@@ -238,40 +200,41 @@ class LinearisedSurrogate:
         return self._direction_errors[k]
 
     def error_root(self, psi: Array) -> Array:
-        """Returns the root of the mean's uncertainty, shape (H, m, d)."""
-        root = self.error_roots[0]
-        for k in np.nonzero(psi)[0]:
-            linear, square = self.error_roots[1 + 2 * k], self.error_roots[2 + 2 * k]
-            root = root + psi[k] * linear + psi[k] ** 2 * square + self._curve_root(int(k), psi[k])
-        crossed = self.surrogate.crossed
-        for k, other in self.surrogate.crossed_of(psi[None]):
-            root = root + psi[k] * psi[other] * self.crossed_roots[crossed.index((k, other))]
-        return root
+        """Returns the root of the mean's uncertainty, but for the shifts, shape (H, m, d)."""
+        return self.mean_error.root(psi)
 
-    def _curve_root(self, k: int, strength: float) -> Array | float:
-        """Root of the uncertainty of r_k, shape (H, m, d); 0 without a curve."""
-        kinds = dict(self.surrogate.curved)
-        if k not in kinds:
-            return 0.0
-        return np.tensordot(
-            curve_columns(np.array(strength), kinds[k]), self.curve_roots[k], axes=1
-        )
+    @cached_property
+    def shift_roots(self) -> Array:
+        """Roots of the uncertainty of the shifts that effects are in part, shape (K, H m, r)."""
+        u = np.column_stack([self.mean_error.theta, self.conditions])
+        effects = range(len(self.surrogate.design.effects))
+        each = [self.surrogate.shift.root(u, k) for k in effects]
+        return np.array([root.reshape(self.size, root.shape[-1]) for root in each])
 
     @cached_property
     def _direction_errors(self) -> list[Array]:
+        effects = range(len(self.surrogate.design.effects))
+        if self.is_known:
+            return [np.zeros((self.size, self.size)) for _ in effects]
         found = []
-        for k in range(len(self.surrogate.design.effects)):
-            low, high = self._span(k)
-            root = self.error_roots[1 + 2 * k] + (low + high) * self.error_roots[2 + 2 * k]
-            curve = self._curve_root(k, high) - self._curve_root(k, low)
-            root = root + curve / (high - low)
+        for k in effects:
             shift = self.shift_roots[k]
-            found.append(self._error(root) + shift @ shift.T)
+            found.append(self._error(self.mean_error.chord(k, *self._span(k))) + shift @ shift.T)
         return found
+
+    def _mean_covariance(self, psi: Array) -> Array:
+        """U at strengths (K,), shape (H m, H m)."""
+        if self.is_known:
+            return np.zeros((self.size, self.size))
+        if not psi.any():
+            return self._base_error.copy()
+        active = np.nonzero(psi)[0]
+        shift = np.sum([psi[k] * self.shift_roots[k] for k in active], axis=0)
+        return self._error(self.error_root(psi)) + shift @ shift.T
 
     @cached_property
     def _base_error(self) -> Array:
-        return self._error(self.error_roots[0])
+        return self._error(self.error_root(self.none()))
 
     def _error(self, roots: Array) -> Array:
         """Errors on different axes are independent."""
@@ -288,26 +251,3 @@ class LinearisedSurrogate:
         rows = np.tile(conditions, (len(v), 1))
         strengths = np.repeat(psi, count, axis=0)
         return self.surrogate.mean(theta, rows, strengths).reshape(len(v), -1)
-
-
-def _curve_roots(surrogate: Surrogate, u: Array, k: int) -> Array:
-    """Roots of the uncertainty of what sines of r_k multiply at u (H, p + q), (f, H, m, d)."""
-    kinds = dict(surrogate.curved)
-    size, width = surrogate.roots.shape[::2]
-    if k not in kinds:
-        return np.empty((0, len(u), size, width))
-    columns = surrogate.roots[:, surrogate.curve(k)].transpose(1, 0, 2)
-    found = fold_curve(columns, u, kinds[k])
-    assert found.shape == (CURVES, len(u), size, width)
-    return found
-
-
-def _crossed_roots(surrogate: Surrogate, conditions: Array) -> Array:
-    """Roots of the uncertainty of what two effects do together, shape (X, H, m, d)."""
-    along = crossed_columns(conditions)
-    shape = len(surrogate.crossed), len(conditions), *surrogate.roots.shape[::2]
-    roots: Array = np.empty(shape)
-    for i, (k, other) in enumerate(surrogate.crossed):
-        part = surrogate.roots[:, surrogate.crossed_slice(k, other)]
-        roots[i] = np.einsum("hf,mfd->hmd", along, part)
-    return roots

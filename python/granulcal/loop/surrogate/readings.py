@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 _LARGEST = 0.99
 # Residuals beyond this many standard deviations do not say how much is shared.
 _HELD = 6.0
+# Columns that are turned at a time.
+_CHUNK = 256
 
 
 @dataclass(frozen=True)
@@ -54,11 +56,18 @@ class Readings:
         """One over the readings of each row's pour, shape (n,)."""
         return 1.0 / self.counts[self.pour]
 
-    def apart(self, rows: Array, rho: float) -> Array:
-        """Returns the rows (n, any) or (n,) as independent ones of variance 1."""
-        turned = self._turned(rows)
-        turned /= self._spread(rho).reshape(-1, *(1,) * (rows.ndim - 1))
-        return turned
+    def apart(self, rows: Array, rho: float, scale: Array | None = None) -> Array:
+        """Returns the rows (n, any) or (n,), over a scale (n,), as independent ones of variance 1.
+
+        Many columns are turned a few at a time.
+        """
+        columns = rows if rows.ndim == 2 else rows[:, None]
+        found, spread = np.empty(columns.shape), self._spread(rho)[:, None]
+        for start in range(0, columns.shape[1], _CHUNK):
+            part = columns[:, start : start + _CHUNK]
+            over = part if scale is None else part / scale[:, None]
+            found[:, start : start + _CHUNK] = self._turned(over) / spread
+        return found.reshape(rows.shape)
 
     def together(self, rows: Array, rho: float) -> Array:
         """Returns what `apart` was given, of what it returned."""
@@ -79,7 +88,7 @@ class Readings:
         """Rows of a pour after its first, shape (n,)."""
         order = np.argsort(self.pour, kind="stable")
         found = np.ones(len(order), dtype=bool)
-        found[order[np.concatenate([[0], np.cumsum(self.counts)[:-1]])]] = False
+        found[order[np.cumsum(self.counts) - self.counts]] = False
         return found
 
     def _spread(self, rho: float) -> Array:

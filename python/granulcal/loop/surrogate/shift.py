@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.surrogate.inverse import inverse_of
 from granulcal.loop.surrogate.leading import LeadingBasis
+from granulcal.loop.surrogate.triangle import root_of
 
 __all__ = ["Shift"]
 
@@ -146,18 +146,18 @@ def _ridge(
     """Coefficients and the root of their covariance; a prior width for each of equal blocks."""
     size = len(along) // max(blocks, 1)
     widths, variance = np.full(blocks, 0.1), 1.0
-    inverse, c = np.eye(len(along)), np.zeros(len(along))
+    root, c = np.eye(len(along)), np.zeros(len(along))
     for _ in range(_ROUNDS if blocks else 0):
         precision = gram / variance
         precision[np.diag_indices_from(precision)] += 1 / np.repeat(widths, size)
-        inverse = inverse_of(precision)
-        c = inverse @ (along / variance)
-        known = 0.0
+        root = root_of(precision)
+        c = root @ (root.T @ (along / variance))
+        spread, known = np.sum(root**2, axis=1), 0.0
         for b in range(blocks):
             part = slice(b * size, (b + 1) * size)
-            own = max(size - float(np.diag(inverse)[part].sum()) / widths[b], 1e-6)
+            own = max(size - float(spread[part].sum()) / widths[b], 1e-6)
             widths[b] = min(max(float(c[part] @ c[part]) / own, _SMALLEST), _LARGEST)
             known += own
         left = max(square - 2 * float(c @ along) + float(c @ gram @ c), 1e-300)
         variance = left / max(count - known, 1.0)
-    return c, np.asarray(np.linalg.cholesky(inverse), dtype=np.float64)
+    return c, root

@@ -42,11 +42,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.bayessim.emulator.basis import Basis, learn_length_scales, polynomial
-from granulcal.bayessim.emulator.noise import fit_log_scale
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.effects.design import Design
 from granulcal.loop.surrogate.anchor import Anchor
+from granulcal.loop.surrogate.axis_fits import AxisFits
 from granulcal.loop.surrogate.blocks import fit_blocks
+from granulcal.loop.surrogate.bordered import Features
+from granulcal.loop.surrogate.bordering import Bordering
 from granulcal.loop.surrogate.columns import (
     crossed_columns,
     crossed_effects,
@@ -65,9 +67,9 @@ from granulcal.loop.surrogate.columns import (
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.leading import LeadingBasis
 from granulcal.loop.surrogate.readings import Readings
+from granulcal.loop.surrogate.roots import Roots
 from granulcal.loop.surrogate.shift import Shift
 from granulcal.loop.surrogate.transform import Transform
-from granulcal.progress import steps
 
 __all__ = ["DONOR_SHARE", "Surrogate"]
 
@@ -78,8 +80,6 @@ _LENGTH_FREQUENCIES = 64
 _SCALE_FEATURES = 10
 _SCALE_STRETCH = 2.0
 _LEAST_ROWS = 60
-# What readings of one pour share of its noise before residuals have told it.
-_SHARED = 0.5
 
 DONOR_SHARE = 0.35
 """Rows whose residuals are kept from R, to make replicates of."""
@@ -102,7 +102,7 @@ class Surrogate:
         basis: features of f_0 over (theta, c).
         shift: the part of each effect that is a shift of theta.
         coefficients: shape (m, d).
-        roots: of the coefficients' posterior covariances, shape (m, d, d).
+        roots: of the coefficients' posterior covariances.
         scale_basis: features of the log scales over (theta, c).
         scale_coefficients: shape (m, e).
         correlation: R over the archive, nearly the identity, shape (m, m).
@@ -131,7 +131,7 @@ class Surrogate:
     basis: LeadingBasis
     shift: Shift
     coefficients: Array
-    roots: Array
+    roots: Roots
     scale_basis: Basis
     scale_coefficients: Array
     correlation: Array
@@ -217,7 +217,6 @@ class Surrogate:
         scale_basis = Basis.draw(
             u, _SCALE_STRETCH * lengths, features=_SCALE_FEATURES, seed=seed + 1, degree=2
         )
-        count, size = z.shape
         shift = _shift(design, basis, u, psi_, z, base)
         moved = np.zeros_like(z)
         for k in range(psi_.shape[1]):
@@ -226,32 +225,11 @@ class Surrogate:
         z = z - moved
         crossed, curved = crossed_effects(psi_), curved_effects(design, psi_)
         inputs = condition_.shape[1]
-        design_matrix, blocks = mean_columns(basis, u, psi_, design.bends, crossed, inputs, curved)
-        scale_matrix = scale_columns(scale_basis, u, psi_, design.bends)
-        coefficients = np.empty((size, design_matrix.shape[1]))
-        roots = np.empty((size, design_matrix.shape[1], design_matrix.shape[1]))
-        scale_coefficients = np.empty((size, scale_matrix.shape[1]))
-        white, noise, scales = np.empty((3, count, size))
-        dof = 0.0
-        alike = readings.apart(design_matrix, _SHARED)
-        gram = alike.T @ alike
-        ones = np.ones(count)
-        for j in steps("surrogate", range(size)):
-            fit = fit_blocks(alike, readings.apart(z[:, j], _SHARED), ones, blocks, gram)
-            left = readings.together(fit.noise, _SHARED)
-            scale = np.exp(scale_matrix @ fit_log_scale(scale_matrix, left))
-            rho = readings.shared(left / scale)
-            weighted = readings.apart(design_matrix / scale[:, None], rho)
-            target = readings.apart(z[:, j] / scale, rho)
-            fit = fit_blocks(weighted, target, ones, blocks, weighted.T @ weighted)
-            left = scale * readings.together(fit.noise, rho)
-            scale_coefficients[j] = fit_log_scale(scale_matrix, left)
-            scales[:, j] = np.exp(scale_matrix @ scale_coefficients[j])
-            coefficients[j], roots[j] = fit.coefficients, fit.root
-            white[:, j] = scale * readings.together(fit.left_out, rho) / scales[:, j]
-            noise[:, j] = left / scales[:, j]
-            dof += (fit.dof - (count - len(readings.counts))) / size
-        noise /= np.sqrt(np.mean(np.clip(noise, -6, 6) ** 2, axis=0))
+        of_mean, blocks = mean_columns(basis, u, psi_, design.bends, crossed, inputs, curved)
+        bordered = Features.of(Bordering.of(of_mean, blocks, readings), of_mean)
+        of_mean = of_mean[base]
+        of_scale = scale_columns(scale_basis, u, psi_, design.bends)
+        fits = AxisFits.of(bordered, blocks, of_scale, z, readings)
         # All readings of a pour or none: another's residual is nearly its own.
         lends = np.random.default_rng(seed).random(len(readings.counts)) < DONOR_SHARE
         return cls(
@@ -266,18 +244,20 @@ class Surrogate:
             raw_range=np.stack([np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)]),
             basis=basis,
             shift=shift,
-            coefficients=coefficients,
-            roots=roots,
+            coefficients=fits.coefficients,
+            roots=fits.roots,
             scale_basis=scale_basis,
-            scale_coefficients=scale_coefficients,
-            correlation=noise_correlation(noise, readings.shares),
-            lack=lack_of_fit(basis, u[base], design_matrix[base], roots, white[base], scales[base]),
-            white=white,
-            noise=noise,
+            scale_coefficients=fits.scale_coefficients,
+            correlation=noise_correlation(fits.noise, readings.shares),
+            lack=lack_of_fit(
+                basis, u[base], of_mean, fits.roots, fits.white[base], fits.scales[base]
+            ),
+            white=fits.white,
+            noise=fits.noise,
             rows=u,
             is_donor=lends[readings.pour],
             shares=readings.shares,
-            dof=dof,
+            dof=fits.dof,
             excluded=int((~kept).sum()),
             crossed=crossed,
             curved=curved,

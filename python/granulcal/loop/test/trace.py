@@ -160,8 +160,7 @@ class Trace:
     @cached_property
     def power(self) -> Power:
         """Kappa, confusion and detectable strengths at the base fit."""
-        design = self.local.surrogate.design
-        return power_at(design, [(self.local, self.base_fit)])
+        return power_at(self.local, self.base_fit)
 
     @property
     def best(self) -> Explanation:
@@ -315,19 +314,24 @@ def power(
     # Repeats of one condition have no inputs: (H, 0) is what no -1 can stand for.
     where = np.asarray(conditions, dtype=np.float64)
     where = where.reshape(len(each), len(surrogate.design.conditions))
-    places = []
-    for v in normal_from_cube(np.vstack([first, others])):
+    places = list(normal_from_cube(np.vstack([first, others])))
+    candidates = surrogate.design.candidates
+
+    def at(v: Array) -> tuple[LinearisedSurrogate, Fit]:
+        """The surrogate around v, and the fit there; each takes tens of megabytes."""
         local = LinearisedSurrogate.at(surrogate, where, each, v, sessions)
-        places.append((local, fit_at(local, v)))
-    return power_at(surrogate.design, places)
+        return local, fit_at(local, v)
+
+    found = np.array([distances(*at(v), candidates) for v in steps("materials", places)])
+    return Power.of(surrogate.design, Scores.of(*at(places[0]), candidates), found)
 
 
 @one_thread()
-def power_at(design: Design, places: Sequence[tuple[LinearisedSurrogate, Fit]]) -> Power:
-    """Returns what pours could see of materials, kappa and the cosines those of the first."""
-    shown = steps("materials", places)
-    found = np.array([distances(local, fit, design.candidates) for local, fit in shown])
-    return Power.of(design, Scores.of(*places[0], design.candidates), found)
+def power_at(local: LinearisedSurrogate, fit: Fit) -> Power:
+    """Returns what pours could see of the material of a fit."""
+    design = local.surrogate.design
+    found = distances(local, fit, design.candidates)[None]
+    return Power.of(design, Scores.of(local, fit, design.candidates), found)
 
 
 def _families(design: Design, scores: Scores) -> tuple[tuple[str, ...], ...]:
