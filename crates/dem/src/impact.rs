@@ -102,7 +102,7 @@ impl Impacts {
         around.threads.gather(candidates, SHARE, &mut self.foreseen, foreseen, |(), ()| ());
         self.queue.extend(self.foreseen.drain(..));
         let before = self.work.impacts;
-        if around.threads.are_several() && self.queue.len() >= ahead::FEW {
+        if around.threads.are_several() && self.queue.len() >= ahead::MANY {
             let room = std::mem::take(&mut self.room);
             around.threads.rounds(
                 (particles, contacts),
@@ -139,11 +139,16 @@ impl Impacts {
             }
             let collision = if self.ahead.holds(&event, &self.counts, contacts.listing()) {
                 self.ahead.take(&event)
-            } else if foretells && self.queue.len() >= ahead::FEW {
-                return self.next_ones(event, contacts.listing());
             } else {
+                if foretells && self.queue.len() >= ahead::FEW {
+                    let window = self.ahead.window();
+                    if window > 1 {
+                        return self.next_ones(event, window, contacts.listing());
+                    }
+                }
                 self.cluster.collide(event.pair, event.time, particles, contacts, around)
             };
+            self.ahead.note_turn();
             if let Some(collision) = collision {
                 self.let_happen(&collision, event.time, particles, contacts, around);
             }
@@ -156,10 +161,10 @@ impl Impacts {
         event.counts != self.counts_of(event.pair)
     }
 
-    /// This impact, and those that come after it as far as they are not foretold.
-    fn next_ones(&mut self, first: Event, listing: &Partners) -> Vec<Event> {
+    /// This impact, and so many with those that come after it, as far as they are not foretold.
+    fn next_ones(&mut self, first: Event, window: usize, listing: &Partners) -> Vec<Event> {
         let mut next = vec![first];
-        next.extend((1..ahead::MOST).map_while(|_| self.queue.pop()));
+        next.extend((1..window).map_while(|_| self.queue.pop()));
         self.queue.extend(&next);
         next.retain(|event| {
             !self.is_past(event) && !self.ahead.holds(event, &self.counts, listing)

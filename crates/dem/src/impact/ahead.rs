@@ -16,9 +16,13 @@ use crate::particles::Particles;
 use crate::partners::Partners;
 
 /// Impacts that are foretold at once, at most. The more, the more of them are overtaken by what others do before.
-pub(super) const MOST: usize = if cfg!(test) { 6 } else { 64 };
+const MOST: usize = if cfg!(test) { 6 } else { 64 };
+/// Impacts of a substep from which on threads are worth being called.
+pub(super) const MANY: usize = if cfg!(test) { 4 } else { 128 };
 /// Impacts to come below which threads are not worth their waiting for each other.
 pub(super) const FEW: usize = if cfg!(test) { 2 } else { 16 };
+/// Impacts after which two are foretold again where that had been for nothing.
+const PAUSE: usize = if cfg!(test) { 3 } else { 32 };
 
 /// An impact as the state was when it was foretold.
 #[derive(Clone, Debug)]
@@ -65,13 +69,47 @@ impl Clone for Room {
     }
 }
 
-/// The foretold impacts of a substep, each with the impacts that the grains which it has looked at had had.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Ahead(HashMap<Candidate, (Foretold, Vec<u32>)>);
+/// The foretold impacts of a substep.
+#[derive(Clone, Debug)]
+pub(super) struct Ahead {
+    /// Each with the impacts that the grains which it has looked at had had.
+    of_pair: HashMap<Candidate, (Foretold, Vec<u32>)>,
+    /// Impacts that are foretold at once now.
+    window: usize,
+    /// Those foretold in the last round, and what has had its turn since.
+    told: usize,
+    done: usize,
+}
+
+impl Default for Ahead {
+    fn default() -> Self {
+        Self { of_pair: HashMap::new(), window: MOST, told: 0, done: 0 }
+    }
+}
 
 impl Ahead {
     pub fn clear(&mut self) {
-        self.0.clear();
+        self.of_pair.clear();
+        self.told = 0;
+    }
+
+    /// Notes that an impact has had its turn.
+    pub fn note_turn(&mut self) {
+        self.done += 1;
+    }
+
+    /// How many impacts to foretell now; 1 is none but the next. Where grains are close, as in a stem, most of them are
+    /// overtaken: fewer then.
+    pub fn window(&mut self) -> usize {
+        if self.window > 1 {
+            let is_for_nothing = 4 * self.done < 3 * self.told;
+            let next = if is_for_nothing { self.window / 2 } else { 2 * self.window };
+            self.window = next.min(MOST);
+            self.done = 0;
+        } else if self.done >= PAUSE {
+            (self.window, self.told, self.done) = (2, 0, 0);
+        }
+        self.window
     }
 
     /// Notes what was foretold when grains had had so many impacts.
@@ -80,12 +118,13 @@ impl Ahead {
             let had = foretold.seen.iter().map(|&grain| counts[grain as usize]).collect();
             (foretold.pair, (foretold, had))
         };
-        self.0.extend(foretold.into_iter().map(with_counts));
+        self.told = foretold.len();
+        self.of_pair.extend(foretold.into_iter().map(with_counts));
     }
 
     /// Whether what was foretold of an impact still holds.
     pub fn holds(&self, event: &Event, counts: &[u32], listing: &Partners) -> bool {
-        self.0.get(&event.pair).is_some_and(|(foretold, had)| {
+        self.of_pair.get(&event.pair).is_some_and(|(foretold, had)| {
             let as_then = |(&grain, &count): (&u32, &u32)| {
                 let grain = grain as usize;
                 counts[grain] == count && listing.has_all_since(grain, foretold.added)
@@ -96,13 +135,33 @@ impl Ahead {
 
     /// What was foretold of an impact.
     pub fn take(&mut self, event: &Event) -> Option<Collision> {
-        self.0.remove(&event.pair)?.0.collision
+        self.of_pair.remove(&event.pair)?.0.collision
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn fewer_are_foretold_where_they_are_overtaken() {
+        let mut ahead = Ahead::default();
+        let round = |ahead: &mut Ahead, turns: usize| {
+            ahead.told = ahead.window;
+            (0..turns).for_each(|_| ahead.note_turn());
+            ahead.window()
+        };
+        assert_eq!(round(&mut ahead, MOST), MOST);
+        assert_eq!(round(&mut ahead, 1), MOST / 2);
+        while round(&mut ahead, 1) > 1 {}
+        for _ in 1..PAUSE {
+            assert_eq!(ahead.window(), 1);
+            ahead.note_turn();
+        }
+        ahead.note_turn();
+        assert_eq!(ahead.window(), 2);
+        assert_eq!(round(&mut ahead, 2), 4);
+    }
 
     #[test]
     fn what_is_foretold_holds_until_a_grain_that_it_saw_is_hit_or_gets_a_partner() {
