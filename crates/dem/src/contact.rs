@@ -76,7 +76,7 @@ pub(crate) struct ContactKey {
 }
 
 /// Two grains, or a grain and a wall, that may be an impact within the substep.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Candidate {
     pub i: u32,
     /// Second grain, or the number of grains plus the wall's number.

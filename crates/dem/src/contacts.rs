@@ -124,11 +124,6 @@ impl Contacts {
         }
     }
 
-    /// With whom each grain is listed.
-    pub fn listing(&self) -> &Partners {
-        &self.partners
-    }
-
     /// Those that a grain is listed with: grains, and walls with the number of grains added.
     pub fn partners(&self, grain: usize) -> impl Iterator<Item = u32> + '_ {
         self.partners.of(grain)

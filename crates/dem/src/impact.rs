@@ -4,26 +4,22 @@
 //! must (`ContactContext::impact_speed`) and meets before the substep ends collides, together with every contact that
 //! is closed then (`impact/cluster.rs`); what is slower is left to the contact solve.
 
-mod ahead;
 mod cluster;
-mod event;
 mod friction;
 mod links;
 mod members;
 mod rolling_spring;
 mod spring;
 
+use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use crate::contact::Candidate;
 use crate::contact_context::ContactContext;
 use crate::contacts::Contacts;
 use crate::particles::Particles;
-use crate::partners::Partners;
 
-use ahead::{Ahead, Room};
-use cluster::{Cluster, Collision};
-use event::Event;
+use cluster::{Cluster, Outcome};
 
 /// Impacts of one grain in a substep, at most; what is left then is for the contact solve.
 const MAX_IMPACTS: u32 = 1024;
@@ -52,14 +48,57 @@ pub struct ImpactWork {
 }
 
 impl ImpactWork {
-    fn note(&mut self, collision: &Collision) {
-        let outcome = &collision.outcome;
+    fn note(&mut self, outcome: &Outcome, grains_hit: usize) {
         self.impacts += 1;
         self.alone += usize::from(outcome.micro_steps == 0);
         self.links += outcome.links;
-        self.grains_hit += collision.hit().len();
+        self.grains_hit += grains_hit;
         self.micro_steps += outcome.micro_steps;
         self.largest_energy_ratio = self.largest_energy_ratio.max(outcome.energy_ratio);
+    }
+}
+
+/// An impact to come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Event {
+    /// `[s]` into the substep.
+    time: f64,
+    pair: Candidate,
+    /// Impacts that both had had when this one was foreseen.
+    counts: [u32; 2],
+}
+
+impl Event {
+    /// The impact of a pair, if there is one in this substep after `now`.
+    fn next(
+        pair: Candidate,
+        now: f64,
+        counts: [u32; 2],
+        particles: &Particles,
+        around: &ContactContext,
+    ) -> Option<Self> {
+        let time = match other_grain(pair, particles) {
+            Some(j) => time_of_pair(pair.i as usize, j, now, particles, around.impact_speed),
+            None => time_at_wall(pair, now, particles, around),
+        };
+        let time = time.filter(|&time| time < around.settings.dt)?;
+        Some(Self { time, pair, counts })
+    }
+}
+
+impl Eq for Event {}
+
+impl Ord for Event {
+    /// Greatest is first: the earliest, then the lowest grains.
+    fn cmp(&self, other: &Self) -> Ordering {
+        let key = |event: &Self| (event.pair.i, event.pair.partner);
+        other.time.total_cmp(&self.time).then_with(|| key(other).cmp(&key(self)))
+    }
+}
+
+impl PartialOrd for Event {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
     }
 }
 
@@ -78,8 +117,6 @@ pub(crate) struct Impacts {
     hit: Vec<u32>,
     partners: Vec<u32>,
     cluster: Cluster,
-    ahead: Ahead,
-    room: Room,
     /// What impacts have cost and taken so far.
     pub work: ImpactWork,
 }
@@ -101,107 +138,49 @@ impl Impacts {
         let candidates = &mut self.candidates;
         around.threads.gather(candidates, SHARE, &mut self.foreseen, foreseen, |(), ()| ());
         self.queue.extend(self.foreseen.drain(..));
-        let before = self.work.impacts;
-        if around.threads.are_several() && self.queue.len() >= ahead::MANY {
-            let room = std::mem::take(&mut self.room);
-            around.threads.rounds(
-                (particles, contacts),
-                |(particles, contacts), foretold| {
-                    self.ahead.extend(foretold, &self.counts);
-                    self.go_on(true, particles, contacts, around)
-                },
-                |(particles, contacts), event| room.foretell(event, particles, contacts, around),
-            );
-            self.room = room;
-            self.ahead.clear();
-        } else {
-            self.go_on(false, particles, contacts, around);
+        let mut resolved = 0;
+        while let Some(Event { time, pair, counts }) = self.queue.pop() {
+            if counts != self.counts_of(pair) {
+                continue;
+            }
+            if self.is_early(pair, time, particles, around) {
+                continue;
+            }
+            let Some(outcome) = self.cluster.resolve(pair, time, particles, contacts, around)
+            else {
+                continue;
+            };
+            self.work.note(&outcome, self.cluster.hit.len());
+            self.work_of_walls += outcome.work_of_walls;
+            resolved += 1;
+            let hit = std::mem::take(&mut self.cluster.hit);
+            for &grain in &hit {
+                let (number, grain) = (grain, grain as usize);
+                if self.counts[grain] == 0 {
+                    self.hit.push(number);
+                }
+                // What walls crush is not let go by more of the same in this substep.
+                self.counts[grain] += if outcome.is_cut { MAX_IMPACTS } else { 1 };
+                contacts.follow_after_impact(grain, time, particles, around);
+            }
+            for &grain in &hit {
+                self.foresee_all(grain as usize, time, particles, contacts, around);
+            }
+            self.cluster.hit = hit;
         }
         self.candidates.clear();
         for grain in self.hit.drain(..) {
             self.counts[grain as usize] = 0;
         }
-        self.work.impacts - before
-    }
-
-    /// Lets impacts happen until none is left, or the next one has to be foretold for it is one of many: returns those
-    /// to foretell then.
-    fn go_on(
-        &mut self,
-        foretells: bool,
-        particles: &mut Particles,
-        contacts: &mut Contacts,
-        around: &ContactContext,
-    ) -> Vec<Event> {
-        while let Some(event) = self.queue.pop() {
-            if self.is_past(&event) || self.is_early(&event, particles, around) {
-                continue;
-            }
-            let collision = if self.ahead.holds(&event, &self.counts, contacts.listing()) {
-                self.ahead.take(&event)
-            } else {
-                if foretells && self.queue.len() >= ahead::FEW {
-                    let window = self.ahead.window();
-                    if window > 1 {
-                        return self.next_ones(event, window, contacts.listing());
-                    }
-                }
-                self.cluster.collide(event.pair, event.time, particles, contacts, around)
-            };
-            self.ahead.note_turn();
-            if let Some(collision) = collision {
-                self.let_happen(&collision, event.time, particles, contacts, around);
-            }
-        }
-        Vec::new()
-    }
-
-    /// Whether a grain of the pair has had an impact since this one was foreseen.
-    fn is_past(&self, event: &Event) -> bool {
-        event.counts != self.counts_of(event.pair)
-    }
-
-    /// This impact, and so many with those that come after it, as far as they are not foretold.
-    fn next_ones(&mut self, first: Event, window: usize, listing: &Partners) -> Vec<Event> {
-        let mut next = vec![first];
-        next.extend((1..window).map_while(|_| self.queue.pop()));
-        self.queue.extend(&next);
-        next.retain(|event| {
-            !self.is_past(event) && !self.ahead.holds(event, &self.counts, listing)
-        });
-        next
-    }
-
-    /// Lets an impact happen, and foresees what comes of it.
-    fn let_happen(
-        &mut self,
-        collision: &Collision,
-        time: f64,
-        particles: &mut Particles,
-        contacts: &mut Contacts,
-        around: &ContactContext,
-    ) {
-        collision.happen(particles);
-        self.work.note(collision);
-        self.work_of_walls += collision.outcome.work_of_walls;
-        for grain in collision.hit() {
-            if self.counts[grain] == 0 {
-                self.hit.push(grain as u32);
-            }
-            // What walls crush is not let go by more of the same in this substep.
-            self.counts[grain] += if collision.outcome.is_cut { MAX_IMPACTS } else { 1 };
-            contacts.follow_after_impact(grain, time, particles, around);
-        }
-        for grain in collision.hit() {
-            self.foresee_all(grain, time, particles, contacts, around);
-        }
+        resolved
     }
 
     /// Whether a wall that bends is not reached yet at the time that its first normal gave; the impact is then foreseen
     /// anew.
     fn is_early(
         &mut self,
-        &Event { pair, time, .. }: &Event,
+        pair: Candidate,
+        time: f64,
         particles: &Particles,
         around: &ContactContext,
     ) -> bool {
@@ -257,4 +236,65 @@ impl Impacts {
     ) {
         self.queue.extend(Event::next(pair, now, self.counts_of(pair), particles, around));
     }
+}
+
+fn other_grain(pair: Candidate, particles: &Particles) -> Option<usize> {
+    let j = pair.partner as usize;
+    (j < particles.count()).then_some(j)
+}
+
+/// When two grains on their straight ways touch, at `least` so fast `[m/s]`: the root of `|d + w tau| = r_i + r_j`.
+fn time_of_pair(i: usize, j: usize, now: f64, particles: &Particles, least: f64) -> Option<f64> {
+    let (a, b) = (particles.sphere_at(i, now), particles.sphere_at(j, now));
+    let apart = particles.nearest(a.vector() - b.vector());
+    let relative = particles.velocity(i) - particles.velocity(j);
+    let touching = a.0[3] + b.0[3];
+    let closing = -apart.dot(&relative);
+    if closing <= least * touching {
+        return None;
+    }
+    let excess = apart.norm_squared() - touching * touching;
+    if excess <= 0.0 {
+        return Some(now);
+    }
+    let discriminant = closing * closing - relative.norm_squared() * excess;
+    // At the touch the approach is the root of the discriminant over the distance of the centres.
+    if discriminant <= (least * touching).powi(2) {
+        return None;
+    }
+    Some(now + excess / (closing + discriminant.sqrt()))
+}
+
+/// When a grain touches a wall, on the parabola of which the substep is the chord.
+fn time_at_wall(
+    pair: Candidate,
+    now: f64,
+    particles: &Particles,
+    around: &ContactContext,
+) -> Option<f64> {
+    let (grain, dt) = (pair.i as usize, around.settings.dt);
+    let surface = pair.partner as usize - particles.count();
+    let sphere = particles.sphere_at(grain, now);
+    let near = around.walls.nearest(surface, &sphere.vector(), now);
+    if near.distance.is_infinite() {
+        return None;
+    }
+    let gap = near.distance - sphere.0[3];
+    let touching = sphere.vector() - near.distance * near.normal;
+    let w_n = near
+        .normal
+        .dot(&(particles.velocity(grain) - around.walls.wall(surface).motion_at(&touching).0));
+    let fall = near.normal.dot(&around.gravity);
+    if gap <= 0.0 {
+        return (w_n + fall * (now - 0.5 * dt) < -around.impact_speed).then_some(now);
+    }
+    // gap + w_n tau - fall / 2 (time (dt - time) - now (dt - now)) = 0 for time = now + tau.
+    let speed = -(w_n + fall * (now - 0.5 * dt));
+    let discriminant = speed * speed - 2.0 * fall * gap;
+    if discriminant <= around.impact_speed * around.impact_speed {
+        return None;
+    }
+    let root = discriminant.sqrt();
+    // Downhill the larger denominator is the earlier root; without one the wall is never reached.
+    (speed + root > 0.0).then(|| now + 2.0 * gap / (speed + root))
 }

@@ -3,8 +3,6 @@
 //! A loop is cut into shares. Nothing is summed across shares, and what they find is put together in their order: the
 //! result is that of one share, whatever the number of threads.
 
-mod crew;
-
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -12,12 +10,9 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::DemError;
-use crew::Crew;
 
 /// Threads that are made at most, on a machine with fewer cores.
 const MOST_THREADS: usize = 64;
-/// Threads that stay awake for short rounds, at most.
-const MOST_IN_CREW: usize = 8;
 
 /// The threads of one simulation. Small loops, and all loops of a single thread, stay on the calling thread.
 #[derive(Clone, Debug, Default)]
@@ -49,49 +44,6 @@ impl Threads {
     /// The pool, if `items` are enough for two shares.
     fn pool_for(&self, items: usize, share: usize) -> Option<&ThreadPool> {
         self.0.as_deref().filter(|_| items / 2 >= share)
-    }
-
-    /// Calls `work` for the items of one round after the other, on several threads if there are several. Between rounds
-    /// `lead` may change the state: it gets what the last round has found, in the order of its items, and says what the
-    /// next one is about, until that is nothing. Threads stay awake between rounds, which may be short.
-    pub fn rounds<S: Send + Sync, T: Send, V: Send>(
-        &self,
-        mut state: S,
-        mut lead: impl FnMut(&mut S, Vec<V>) -> Vec<T> + Send,
-        work: impl Fn(&S, &T) -> V + Sync,
-    ) {
-        let Some(pool) = self.0.as_deref() else {
-            let mut items = lead(&mut state, Vec::new());
-            while !items.is_empty() {
-                let found = items.iter().map(|item| work(&state, item)).collect();
-                items = lead(&mut state, found);
-            }
-            return;
-        };
-        let crew = Crew::new(state, &work);
-        let scope = || {
-            rayon::scope(|scope| {
-                let _dismissal = crew.dismissal();
-                for _ in 1..pool.current_num_threads().min(MOST_IN_CREW) {
-                    scope.spawn(|_| crew.stand_by());
-                }
-                let mut found = Vec::new();
-                loop {
-                    let items = lead(&mut crew.state.write().expect("no panic so far"), found);
-                    if items.is_empty() {
-                        break;
-                    }
-                    let Some(next) = crew.round(items) else { break };
-                    found = next;
-                }
-            });
-        };
-        install(pool, scope);
-    }
-
-    /// Whether there are several.
-    pub fn are_several(&self) -> bool {
-        self.0.is_some()
     }
 
     /// Calls `work` for shares of `items`; returns what `join` makes of the values.
@@ -264,30 +216,6 @@ mod tests {
         }
         assert_eq!(results[0], results[1]);
         assert_eq!(results[0], results[2]);
-    }
-
-    #[test]
-    fn rounds_find_the_same_on_any_number_of_threads() {
-        let sums = |count| {
-            let mut sums = Vec::new();
-            let lead = |total: &mut u64, found: Vec<u64>| -> Vec<u64> {
-                *total += found.iter().zip(1..).map(|(value, n)| n * value).sum::<u64>();
-                sums.push(*total);
-                (0..[7, 1, 40, 0][sums.len() - 1]).collect()
-            };
-            Threads::new(count).unwrap().rounds(3, lead, |total, item| total * item);
-            sums
-        };
-        assert_eq!(sums(1)[..2], [3, 3 + 3 * (2 + 6 + 12 + 20 + 30 + 42)]);
-        assert_eq!(sums(1), sums(2));
-        assert_eq!(sums(1), sums(5));
-    }
-
-    #[test]
-    #[should_panic(expected = "item 3")]
-    fn a_panic_in_a_round_ends_it() {
-        let lead = |(): &mut (), _| (0..8).collect();
-        Threads::new(2).unwrap().rounds((), lead, |(), item: &u32| assert!(*item != 3, "item 3"));
     }
 
     #[test]

@@ -68,17 +68,6 @@ impl Partners {
         self.latest[grain] = self.added.len() as u32 - 1;
     }
 
-    /// How many partners have been added since all were replaced.
-    pub fn added(&self) -> usize {
-        self.added.len()
-    }
-
-    /// Whether a grain has got none since so many were added.
-    pub fn has_all_since(&self, grain: usize, added: usize) -> bool {
-        let latest = self.latest[grain];
-        latest == NONE || (latest as usize) < added
-    }
-
     /// The partners of a grain.
     pub fn of(&self, grain: usize) -> impl Iterator<Item = u32> + '_ {
         let listed = self.starts[grain] as usize..self.starts[grain + 1] as usize;
@@ -113,9 +102,7 @@ mod tests {
             });
             partners.add(1, 7);
             partners.add(0, 2);
-            assert_eq!(partners.added(), 2);
             partners.add(0, 5);
-            assert!(!partners.has_all_since(0, 2) && partners.has_all_since(1, 2));
             let of = |grain| partners.of(grain).collect::<Vec<_>>();
             assert_eq!([of(0), of(1), of(2), of(3)], [vec![3, 1, 5, 2], vec![7], vec![1], vec![4]]);
             assert!(partners.has(0, 5) && !partners.has(2, 3));

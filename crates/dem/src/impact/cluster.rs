@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 use super::friction::Friction;
 use super::links::{Link, Links};
-use super::members::{Member, Members};
+use super::members::Members;
 use super::spring::Spring;
 use crate::contact::Candidate;
 use crate::contact_context::ContactContext;
@@ -40,40 +40,6 @@ pub(super) struct Outcome {
     pub energy_ratio: f64,
 }
 
-/// Motion of a grain after an impact.
-#[derive(Clone, Copy, Debug)]
-struct Struck {
-    grain: usize,
-    velocity: Vector3<f64>,
-    spin: Vector3<f64>,
-}
-
-/// An impact that has been worked out, and not happened yet.
-#[derive(Clone, Debug)]
-pub(super) struct Collision {
-    pub outcome: Outcome,
-    /// `[s]` into the substep.
-    time: f64,
-    struck: Vec<Struck>,
-}
-
-impl Collision {
-    /// The grains that it hits.
-    pub fn hit(&self) -> impl ExactSizeIterator<Item = usize> + '_ {
-        self.struck.iter().map(|struck| struck.grain)
-    }
-
-    /// Lets it happen: leaves the grains that it hits where they are then, with their new velocities.
-    pub fn happen(&self, particles: &mut Particles) {
-        for Struck { grain, velocity, spin } in &self.struck {
-            particles.advance(*grain, self.time);
-            let body = &mut particles.bodies[*grain];
-            body.velocity.set(velocity);
-            body.spin.set(spin);
-        }
-    }
-}
-
 /// What stays the same while an impact is resolved.
 struct Scenery<'a> {
     time: f64,
@@ -90,19 +56,21 @@ pub(super) struct Cluster {
     members: Members,
     links: Links,
     springs: Vec<Spring>,
+    /// The grains that the last impact has hit.
+    pub hit: Vec<u32>,
 }
 
 impl Cluster {
-    /// Works out how a pair that meets at `time` `[s]` into the substep collides, with all that touches it, if it still
-    /// closes fast enough.
-    pub fn collide(
+    /// Lets a pair that meets at `time` `[s]` into the substep collide, with all that touches it, if it still closes
+    /// fast enough. Leaves the grains that were hit where they are then.
+    pub fn resolve(
         &mut self,
         pair: Candidate,
         time: f64,
-        particles: &Particles,
+        particles: &mut Particles,
         contacts: &Contacts,
         around: &ContactContext,
-    ) -> Option<Collision> {
+    ) -> Option<Outcome> {
         let fallen = around.gravity * (time - 0.5 * around.settings.dt);
         let scenery = Scenery { time, particles, contacts, around, fallen };
         self.clear();
@@ -116,22 +84,15 @@ impl Cluster {
         };
         self.give_sliding_back();
         let work_of_walls = if around.has_moving_walls { self.work_of_walls(&fallen) } else { 0.0 };
-        let (struck, energy_ratio) = self.struck(particles, &fallen, work_of_walls);
+        let energy_ratio = self.write_back(time, particles, &fallen, work_of_walls);
         let links = self.links.len();
-        let outcome = Outcome { links, micro_steps, is_cut, work_of_walls, energy_ratio };
-        Some(Collision { outcome, time, struck })
-    }
-
-    /// The grains whose motion and partners decided the last collision: those that it linked, and all that these are
-    /// listed with.
-    pub fn seen<'a>(&'a self, contacts: &'a Contacts) -> impl Iterator<Item = u32> + 'a {
-        let linked = self.members.linked().flat_map(|grain| contacts.partners(grain));
-        self.members.grains().map(|grain| grain as u32).chain(linked)
+        Some(Outcome { links, micro_steps, is_cut, work_of_walls, energy_ratio })
     }
 
     fn clear(&mut self) {
         self.members.clear();
         self.links.clear();
+        self.hit.clear();
         if self.springs.len() >= MANY_SPRINGS {
             self.springs.clear();
         }
@@ -397,25 +358,29 @@ impl Cluster {
         self.links.iter().map(of).sum()
     }
 
-    /// The new motion of the grains that were hit, and the ratio of their energies.
-    fn struck(
-        &self,
-        particles: &Particles,
+    /// Puts the new velocities of the grains that were hit into `particles`; returns the ratio of their energies.
+    fn write_back(
+        &mut self,
+        time: f64,
+        particles: &mut Particles,
         fallen: &Vector3<f64>,
         work_of_walls: f64,
-    ) -> (Vec<Struck>, f64) {
+    ) -> f64 {
         let (mut before, mut after) = (work_of_walls, 0.0);
-        let energy = |grain: usize, v: Vector3<f64>, w: Vector3<f64>| {
+        for member in self.members.hit() {
+            let grain = member.grain;
             let mass = 1.0 / particles.inverse_mass[grain];
-            0.5 * mass * ((v + fallen).norm_squared() + w.norm_squared() / INVERSE_INERTIA)
-        };
-        let struck = |&Member { grain, velocity, spin, .. }: &Member| {
-            let body = &particles.bodies[grain];
-            before += energy(grain, body.velocity.vector(), body.spin.vector());
-            after += energy(grain, velocity, spin);
-            Struck { grain, velocity, spin }
-        };
-        let struck = self.members.hit().map(struck).collect();
-        (struck, after / before)
+            let energy = |v: Vector3<f64>, w: Vector3<f64>| {
+                0.5 * mass * ((v + fallen).norm_squared() + w.norm_squared() / INVERSE_INERTIA)
+            };
+            particles.advance(grain, time);
+            let body = &mut particles.bodies[grain];
+            before += energy(body.velocity.vector(), body.spin.vector());
+            after += energy(member.velocity, member.spin);
+            body.velocity.set(&member.velocity);
+            body.spin.set(&member.spin);
+            self.hit.push(grain as u32);
+        }
+        after / before
     }
 }

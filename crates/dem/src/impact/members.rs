@@ -93,17 +93,6 @@ impl Members {
         !member.is_linked
     }
 
-    /// The grains among the members.
-    pub fn grains(&self) -> impl Iterator<Item = usize> + '_ {
-        self.all.iter().filter(|member| !member.is_wall).map(|member| member.grain)
-    }
-
-    /// The grains whose contacts are links.
-    pub fn linked(&self) -> impl Iterator<Item = usize> + '_ {
-        let linked = self.all.iter().filter(|member| member.is_linked && !member.is_wall);
-        linked.map(|member| member.grain)
-    }
-
     /// The grains that were hit.
     pub fn hit(&self) -> impl Iterator<Item = &Member> {
         self.all.iter().filter(|member| member.is_hit && !member.is_wall)
