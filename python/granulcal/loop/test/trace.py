@@ -1,6 +1,6 @@
 """The whole loop on one set of measured pours: fit, residual test, refits, adequacy, verdict."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -160,7 +160,7 @@ class Trace:
     @cached_property
     def power(self) -> Power:
         """Kappa, confusion and detectable strengths at the base fit."""
-        return power_at(self.local, self.base_fit)
+        return power_at(self.local.surrogate.design, [(self.local, self.base_fit)])
 
     @property
     def best(self) -> Explanation:
@@ -315,23 +315,28 @@ def power(
     where = np.asarray(conditions, dtype=np.float64)
     where = where.reshape(len(each), len(surrogate.design.conditions))
     places = list(normal_from_cube(np.vstack([first, others])))
-    candidates = surrogate.design.candidates
 
-    def at(v: Array) -> tuple[LinearisedSurrogate, Fit]:
-        """The surrogate around v, and the fit there; each takes tens of megabytes."""
+    def around(v: Array) -> tuple[LinearisedSurrogate, Fit]:
+        """The surrogate there, and its fit; each takes tens of megabytes."""
         local = LinearisedSurrogate.at(surrogate, where, each, v, sessions)
         return local, fit_at(local, v)
 
-    found = np.array([distances(*at(v), candidates) for v in steps("materials", places)])
-    return Power.of(surrogate.design, Scores.of(*at(places[0]), candidates), found)
+    return power_at(surrogate.design, map(around, steps("materials", places)))
 
 
 @one_thread()
-def power_at(local: LinearisedSurrogate, fit: Fit) -> Power:
-    """Returns what pours could see of the material of a fit."""
-    design = local.surrogate.design
-    found = distances(local, fit, design.candidates)[None]
-    return Power.of(design, Scores.of(local, fit, design.candidates), found)
+def power_at(design: Design, places: Iterable[tuple[LinearisedSurrogate, Fit]]) -> Power:
+    """Returns what pours could see of materials, kappa and the cosines those of the first.
+
+    Places may come one after the other: none is kept.
+    """
+    scores, found = None, []
+    for local, fit in places:
+        found.append(distances(local, fit, design.candidates))
+        if scores is None:
+            scores = Scores.of(local, fit, design.candidates)
+    assert scores is not None, "no material"
+    return Power.of(design, scores, np.array(found))
 
 
 def _families(design: Design, scores: Scores) -> tuple[tuple[str, ...], ...]:
