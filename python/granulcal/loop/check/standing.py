@@ -1,4 +1,4 @@
-"""Whether a verdict stands: what may overturn it once it has been found.
+"""Whether a verdict stands: what may overturn it once it has been found (`falls.py`).
 
 | check | what it asks | if it fails |
 |---|---|---|
@@ -21,6 +21,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from granulcal.loop.check.by_pours import ByPours
+from granulcal.loop.check.falls import (
+    as_far_as_poured,
+    by_definitions,
+    by_distance,
+    by_draws,
+    by_error,
+    by_own_pours,
+    by_surrogate,
+    left_by_base,
+)
+from granulcal.loop.check.moved import Moved, overturned
 from granulcal.loop.check.recentre import Recentred
 from granulcal.loop.check.trivial import TrivialRow
 from granulcal.loop.check.unseen import Seen
@@ -32,30 +43,6 @@ __all__ = ["FALLEN", "Moved", "Standing", "overturned", "stand"]
 
 FALLEN = ("UNCONFIRMED", "OVERTURNED")
 """Words of a verdict that does not stand."""
-LEFT = 1.0
-"""Most D² for each statistic, in squared spreads of the archive, that a named model may leave."""
-
-
-@dataclass(frozen=True)
-class Moved:
-    """The verdict under another definition.
-
-    Attributes:
-        definition: its name.
-        verdict: what the same pours say, defined that way.
-    """
-
-    definition: str
-    verdict: Verdict
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns it for JSON."""
-        return {
-            "definition": self.definition,
-            "verdict": self.verdict.kind,
-            "named": list(self.verdict.named),
-            "p": self.verdict.p,
-        }
 
 
 @dataclass(frozen=True)
@@ -138,21 +125,6 @@ class Standing:
         }
 
 
-def overturned(verdict: Verdict, other: Verdict, name: float) -> bool:
-    """Returns whether `other`, of the same pours defined otherwise, contradicts `verdict`.
-
-    Args:
-        verdict: the registered one.
-        other: under a moved definition.
-        name: largest p at which something may be named.
-    """
-    if verdict.kind in NAMING:
-        return not set(verdict.families) & set(other.families)
-    if verdict.kind == "NONE":
-        return other.p <= name
-    return other.kind == "NONE"
-
-
 def stand(
     before: Verdict,
     rules: Thresholds,
@@ -190,58 +162,15 @@ def stand(
         trivial: rows of the sealed conditions.
         seen: pours of each effect.
     """
-    verdict = word = _left_by_base(before, of_base, rules)
-    against = [one for one in moved if overturned(word, one.verdict, rules.name)]
-    if against:
-        words = ", ".join(f"{one.verdict.kind} under {one.definition}" for one in against)
-        verdict = _fallen("OVERTURNED", before, f"{_said(before)}, but {words}")
-    if nearer is not None and nearer.is_worse:
-        off, best = nearer.total_after.square, nearer.total_before.square
-        why = (
-            "a random draw of the model is nearer to the data than its fit "
-            f"(D² {best:.3g}, {off:.3g})"
-        )
-        verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
-    if word.kind in NAMING and error is not None and error.is_worse:
-        # The base model is the same with strengths of 0: a fit that is farther off is none.
-        off, base = error.total_after.square, error.total_before.square
-        why = f"the base model is nearer to the data (D² {base:.3g}, {off:.3g})"
-        verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
-    if word.kind in NAMING and error is not None and error.total_after.interval[0] > LEFT * size:
-        # Far from all pours they scatter so much that the residual test finds nothing.
-        left = error.total_after.square
-        why = (
-            f"the pours are far from those of every model: with it D² is still {left:.3g}, more "
-            f"than {LEFT:g} squared spread of the archive in each of {size} statistics; are the "
-            "conditions' numbers in the scene's units?"
-        )
-        verdict = Verdict("UNEXPLAINED", (), (), before.p, f"{_said(before)}, but {why}")
-    least = {"NONE": rules.name, **dict.fromkeys(NAMING, rules.adequate)}.get(word.kind, 0.0)
-    pours = own if word is before else of_base
-    if pours is not None and pours.residual_test.p <= least:
-        left = pours.residual_test.p
-        why = f"its own pours at its fit leave something of the data (p = {left:.3g})"
-        if verdict is word and word.kind in NAMING and of_base is not None:
-            # Of the base model they have left something, or there were no name.
-            of_none = of_base.residual_test.p
-            why = f"{_said(before)}, but {why}, as the base model's do (p = {of_none:.3g})"
-            verdict = Verdict("RESIDUAL", (), (), before.p, why)
-        else:
-            verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
-    if not confirmed > rules.confirm:
-        why = (
-            "no fresh pour of its model is usable"
-            if confirmed != confirmed
-            else f"the surrogate is wrong at its fit (p = {confirmed:.3g} of fresh pours)"
-        )
-        verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
-    lacking = ", ".join(f"{one.effect} {one.lacks}" for one in seen if one.lacks)
-    if verdict.kind == "UNEXPLAINED" and lacking:
-        verdict = replace(
-            verdict,
-            reason=f"{verdict.reason}, as far as it has pours: none usable of {lacking}, which may "
-            "still explain it",
-        )
+    word = left_by_base(before, of_base, rules)
+    # Each may take the word away, the last has the last say.
+    verdict = by_definitions(before, word, moved, rules) or word
+    verdict = by_draws(before, nearer) or verdict
+    verdict = by_error(before, word, error) or verdict
+    verdict = by_distance(before, word, error, size) or verdict
+    verdict = by_own_pours(before, word, verdict is word, own, of_base, rules) or verdict
+    verdict = by_surrogate(before, confirmed, rules) or verdict
+    verdict = as_far_as_poured(verdict, seen)
     found = Standing(
         verdict=verdict,
         before=before,
@@ -260,26 +189,3 @@ def stand(
         reason = f"{verdict.reason}; at the sealed conditions {found.beside('it')}"
         return replace(found, verdict=replace(verdict, reason=reason))
     return found
-
-
-def _left_by_base(before: Verdict, of_base: Recentred | None, rules: Thresholds) -> Verdict:
-    """The word that the base model's own pours leave: no surrogate's error may pass for physics."""
-    if of_base is None or before.kind == "NONE":
-        return before
-    p = of_base.residual_test.p
-    leaves = f"{_said(before)}, but pours of the base model at its fit leave"
-    if p > rules.detect:
-        return Verdict("NONE", (), (), p, f"{leaves} nothing (p = {p:.3g})")
-    if p > rules.name and before.kind != "RESIDUAL":
-        why = f"{leaves} too little for more (p = {p:.3g}, at most {rules.name:g} asked)"
-        return Verdict("RESIDUAL", (), (), p, why)
-    return before
-
-
-def _fallen(kind: str, before: Verdict, why: str) -> Verdict:
-    return Verdict(kind, (), (), before.p, why)
-
-
-def _said(verdict: Verdict) -> str:
-    named = f" {', '.join(verdict.named)}" if verdict.named else ""
-    return f"the fits say {verdict.kind}{named}"
