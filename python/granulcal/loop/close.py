@@ -36,10 +36,12 @@ from granulcal.loop.check.checks import (
     nearer,
     trivial,
 )
+from granulcal.loop.check.coverage import Coverage
 from granulcal.loop.check.learning import learning
 from granulcal.loop.check.look_again import look_again
 from granulcal.loop.check.own_errors import as_recorded
 from granulcal.loop.check.prior_rounds import ROUNDS, drawn
+from granulcal.loop.check.recentre import Recentred
 from granulcal.loop.check.standing import stand
 from granulcal.loop.check.steady import drifts
 from granulcal.loop.check.unseen import seen_of, told_unseen
@@ -143,19 +145,8 @@ def close_loop(
     registration = register(folder, task, plan, rules, seed, names, pairs, rounds)
     say(f"registered before any data: {folder / 'preregistration.json'} {registration[:12]}")
 
-    if plan.base < _LEVEL_BASE or (0 < plan.each < _LEVEL_EACH):
-        say(
-            f"note: with {plan.base} pours of the base and {plan.each} of each effect the residual "
-            "test calls a right model wrong more often than it says, at p = 0.05 up to one in six; "
-            f"from {_LEVEL_BASE} and {_LEVEL_EACH} on one in twelve (docs/theory/loop.md)"
-        )
     store = Archive(folder / "archive" if archive is None else Path(archive), plan)
-    say(time_needed(task, store, budget - plan.pours, workers))
-    warn(doubts)
-    if store.missing:
-        # Told before the first pour; whoever goes on has been told.
-        for sentence in drifts(task):
-            say(sentence)
+    _tell_before_pours(task, store, budget, workers, doubts, say)
     store.fill(threads=threads, say=say)
     poured = seen_of(store)
     if surrogate is None:
@@ -163,11 +154,7 @@ def close_loop(
     else:
         surrogate = replace(surrogate, anchor=None)
     analysis = Analysis(task, store.plan, Forward(folder / "pours", workers), rules, seed, say)
-    counts = [len(condition.recordings) for condition in analysis.fitted]
-    middle = np.full(len(task.prior.names), 0.5)
-    units = [analysis.plan.unit(c.at) for c in analysis.fitted]
-    sessions = session_numbers([c.session for c in analysis.fitted])
-    sights = power(surrogate, middle, units, counts, sessions)
+    sights = _power_of(analysis, surrogate)
     say(_power_table(sights))
 
     measured = analysis.measured()
@@ -187,10 +174,7 @@ def close_loop(
         # The winner is another: no random draw of it has been poured.
         best, draws = drawn(analysis, surrogate, found, measured), draws + rules.look
     found, of_base, own = there.trace, there.of_base, there.own
-    if own is not None:
-        say(f"its pours leave of the measured ones what has p = {own.residual_test.p:.3g}")
-    if of_base is not None and own is not of_base:
-        say(f"pours of the base model leave what has p = {of_base.residual_test.p:.3g}")
+    _tell_left(own, of_base, say)
     of_hidden = {c.name: both(analysis.forward, task, c, found, settled.seed) for c in hidden}
     simulated = there.simulated | of_hidden
     elsewhere = moved(analysis, surrogate)
@@ -198,9 +182,7 @@ def close_loop(
         say(f"defined as {other.definition}: {other.verdict.kind}, p = {other.verdict.p:.3g}")
     wide = calibrated(analysis, surrogate, found, pairs)
     if wide is not None:
-        held = f"{wide.held} of {wide.pairs} simulated pairs held by the plain interval"
-        of_it = "the whole range" if wide.is_whole_range else f"stretched by {wide.stretch:.3g}"
-        say(f"{held}; {of_it}")
+        say(_coverage_told(wide))
     recorded = as_recorded(analysis, surrogate, found, measured, simulated)
     fit = error_of(task, analysis.fitted, measured, recorded, surrogate, seed)
     # Opened here, once, after everything that could be chosen has been.
@@ -229,17 +211,16 @@ def close_loop(
     blank = [analysis.pours(c, rows) for c, rows in pretended if len(rows)]
     placebo = trace(surrogate, blank, rules, seed=seed + 1)
     say(f"placebo {placebo.verdict.kind}: {placebo.verdict.reason}")
-    alarms = of_error(standing.verdict, fit, sealed) + of_placebo(placebo.verdict, rules)
-    alarms += of_left(standing.verdict, fit, sealed) + of_rows(standing) + told_unseen(poured)
-    alarms += of_ends(standing.verdict, found.best, task)
-    alarms += of_untried(standing.verdict, task.untried)
+    verdict = standing.verdict
+    alarms = of_error(verdict, fit, sealed) + of_placebo(placebo.verdict, rules)
+    alarms += of_left(verdict, fit, sealed) + of_rows(standing) + told_unseen(poured)
+    alarms += of_ends(verdict, found.best, task) + of_untried(verdict, task.untried)
     if fit.total_before.interval[0] > 0:
-        spread = surrogate.raw_spread[: Measures.of(task.scene).head]
         fitted = {c.name: measured[c.name] for c in analysis.fitted}
+        spread = surrogate.raw_spread[: Measures.of(task.scene).head]
         alarms += of_labels(fitted, {n: simulated[n].base for n in fitted}, spread)
     for alarm in alarms:
         say(f"warning: {alarm}")
-    experiments = next_experiment(surrogate, found, _candidates(analysis.plan))
     closed = Closed(
         task=task,
         standing=standing,
@@ -248,7 +229,7 @@ def close_loop(
         fit=fit,
         sealed=sealed,
         placebo=placebo,
-        experiments=tuple(experiments),
+        experiments=tuple(next_experiment(surrogate, found, _candidates(analysis.plan))),
         pours=plan.pours
         + _needed(task, pairs if wide is not None else 0, draws)
         + learnt
@@ -263,7 +244,7 @@ def close_loop(
         doubts=(*doubts, *alarms),
         seen=poured,
     )
-    said = {"kind": standing.verdict.kind, "named": list(standing.verdict.named)}
+    said = {"kind": verdict.kind, "named": list(verdict.named)}
     models_of(task, analysis.plan, surrogate, found, said, measured, simulated).write(folder)
     write_beside(folder / "verdict.json", json.dumps(closed.to_dict(), indent=1) + "\n")
     write_report(
@@ -353,6 +334,54 @@ def _candidates(plan: ArchivePlan) -> list[tuple[str, Array]]:
             at[i] = share
             found.append((f"{path} = {low + share * (high - low):.4g}", at))
     return found
+
+
+def _tell_before_pours(
+    task: Task,
+    store: Archive,
+    budget: int,
+    workers: int,
+    doubts: tuple[str, ...],
+    say: Callable[[str], None],
+) -> None:
+    """What is known before the first pour: how level the test is, how long it takes, doubts."""
+    plan = store.plan
+    if plan.base < _LEVEL_BASE or (0 < plan.each < _LEVEL_EACH):
+        say(
+            f"note: with {plan.base} pours of the base and {plan.each} of each effect the residual "
+            "test calls a right model wrong more often than it says, at p = 0.05 up to one in six; "
+            f"from {_LEVEL_BASE} and {_LEVEL_EACH} on one in twelve (docs/theory/loop.md)"
+        )
+    say(time_needed(task, store, budget - plan.pours, workers))
+    warn(doubts)
+    if store.missing:
+        # Whoever goes on has been told.
+        for sentence in drifts(task):
+            say(sentence)
+
+
+def _power_of(analysis: Analysis, surrogate: Surrogate) -> Power:
+    """What the pours could show in the middle of the prior, at the conditions that are fitted."""
+    counts = [len(condition.recordings) for condition in analysis.fitted]
+    middle = np.full(len(analysis.task.prior.names), 0.5)
+    units = [analysis.plan.unit(c.at) for c in analysis.fitted]
+    sessions = session_numbers([c.session for c in analysis.fitted])
+    return power(surrogate, middle, units, counts, sessions)
+
+
+def _tell_left(
+    own: Recentred | None, of_base: Recentred | None, say: Callable[[str], None]
+) -> None:
+    """What pours of the verdict's model and of the base model leave of the measured ones."""
+    if own is not None:
+        say(f"its pours leave of the measured ones what has p = {own.residual_test.p:.3g}")
+    if of_base is not None and own is not of_base:
+        say(f"pours of the base model leave what has p = {of_base.residual_test.p:.3g}")
+
+
+def _coverage_told(wide: Coverage) -> str:
+    of_it = "the whole range" if wide.is_whole_range else f"stretched by {wide.stretch:.3g}"
+    return f"{wide.held} of {wide.pairs} simulated pairs held by the plain interval; {of_it}"
 
 
 def _power_table(sights: Power) -> str:
