@@ -189,6 +189,21 @@ def test_constants_and_bad_rows_are_left_out_by_name(toy: Linear) -> None:
     assert found.beyond([seen]) == ("i at here: 4, archive 3 to 3",)
 
 
+def test_a_distance_is_of_statistics_that_vary(toy: Linear) -> None:
+    # What effects alone change has no noise without them; over a constant no distance can be told.
+    theta, c, psi, x = toy.archive()
+    hung, still = 1 - psi[:, :1] / 2, np.full((len(x), 1), 7.0)
+    made = Surrogate.fit(toy.design, theta, c, psi, np.hstack([x, hung, still]), features=4)
+    assert made.dropped == {"x8": "constant in pours without effects", "x9": "constant"}
+    np.testing.assert_allclose(made.raw_spread[:8], x[~psi.any(axis=1)].std(axis=0))
+    assert made.raw_spread[8:].tolist() == [pytest.approx(hung.std()), np.inf]
+    rows = np.hstack([x, hung, still])[:4]
+    off = np.add(rows, [*np.zeros(8), hung.std(), 0.0])
+    found = compare(["4 cm"], [rows], [off], [rows], made.raw_spread, draws=50)
+    assert found.gain == pytest.approx(1)
+    assert np.isfinite(found.total_before.error)
+
+
 def test_bad_input_says_what_would_do(toy: Linear, surrogate: Surrogate) -> None:
     theta, c, psi, x = toy.archive()
     with pytest.raises(TrainingDataError, match="at least 60 usable pours without effects, got 20"):

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.bayessim.emulator.basis import Basis, polynomial
-from granulcal.errors import TrainingDataError
 from granulcal.loop.effects.design import Design
 from granulcal.loop.surrogate.leading import LeadingBasis
 from granulcal.loop.surrogate.roots import Roots
@@ -27,7 +26,6 @@ __all__ = [
     "noise_correlation",
     "scale_columns",
     "uncorrelated_axes",
-    "usable_statistics",
 ]
 
 Array = NDArray[np.float64]
@@ -36,8 +34,6 @@ Array = NDArray[np.float64]
 _SHRINKAGE = 0.03
 # Whitened residuals are held within this many standard deviations where they make covariances.
 _LARGEST_RESIDUAL = 6.0
-# A statistic whose most common value has this share of the pours says nothing smooth.
-_LARGEST_SHARE = 0.9
 # Pairs of near rows that show what the features cannot follow.
 _LACK_ROWS, _NEIGHBOURS = 2000, 4
 # Prior standard deviations of constant, slopes and curvatures of an effect, before its own width.
@@ -84,23 +80,6 @@ def uncorrelated_axes(z: Array, quadratic: Array) -> Array:
     moment = (1 - _SHRINKAGE) * moment + _SHRINKAGE * np.diag(np.diag(moment))
     values, vectors = np.linalg.eigh(moment)
     return (vectors / np.sqrt(values)) @ vectors.T
-
-
-def usable_statistics(x: Array, labels: tuple[str, ...]) -> tuple[NDArray[np.intp], dict[str, str]]:
-    """Columns that can be emulated, and why the others cannot."""
-    dropped: dict[str, str] = {}
-    for j, label in enumerate(labels):
-        finite = x[np.isfinite(x[:, j]), j]
-        if len(finite) < 0.95 * len(x):
-            dropped[label] = f"not finite in {len(x) - len(finite)} of {len(x)} pours"
-        elif finite.std() <= 1e-9 * max(float(np.abs(finite).max()), 1e-300):
-            dropped[label] = "constant"
-        elif np.unique(finite, return_counts=True)[1].max() > _LARGEST_SHARE * len(finite):
-            dropped[label] = "one value in more than nine of ten pours"
-    kept = [j for j, label in enumerate(labels) if label not in dropped]
-    if not kept:
-        raise TrainingDataError("no statistic varies over the archive")
-    return np.array(kept, dtype=np.intp), dropped
 
 
 def mean_columns(

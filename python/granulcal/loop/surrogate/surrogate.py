@@ -62,7 +62,6 @@ from granulcal.loop.surrogate.columns import (
     noise_correlation,
     scale_columns,
     uncorrelated_axes,
-    usable_statistics,
 )
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.leading import LeadingBasis
@@ -70,6 +69,7 @@ from granulcal.loop.surrogate.readings import Readings
 from granulcal.loop.surrogate.roots import Roots
 from granulcal.loop.surrogate.shift import Shift
 from granulcal.loop.surrogate.transform import Transform
+from granulcal.loop.surrogate.usable import spread_of, usable_statistics
 
 __all__ = ["DONOR_SHARE", "Surrogate"]
 
@@ -97,7 +97,8 @@ class Surrogate:
         transforms: scale of each statistic.
         axes: C^-1/2, symmetric, shape (m, m).
         labels: names of all statistics of the archive, s of them.
-        raw_spread: standard deviation of each of these over the base pours, own unit, shape (s,).
+        raw_spread: standard deviation of each of these over the base pours, or over all where it is
+            constant there, infinite where it is in all; own unit, shape (s,).
         raw_range: smallest and largest value of each, shape (2, s).
         basis: features of f_0 over (theta, c).
         shift: the part of each effect that is a shift of theta.
@@ -185,7 +186,7 @@ class Surrogate:
         labels = tuple(names) if names is not None else tuple(f"x{i}" for i in range(x_.shape[1]))
         if len(labels) != x_.shape[1]:
             raise TrainingDataError(f"{x_.shape[1]} statistics need as many names, got {labels}")
-        columns, dropped = usable_statistics(x_, labels)
+        columns, dropped = usable_statistics(x_, labels, np.all(psi_ == 0, axis=1))
         kept = np.isfinite(x_[:, columns]).all(axis=1)
         number = np.arange(len(x_)) if pour is None else np.asarray(pour)
         if number.shape != (len(x_),):
@@ -240,7 +241,7 @@ class Surrogate:
             transforms=transforms,
             axes=axes,
             labels=labels,
-            raw_spread=np.nanstd(finite[base], axis=0),
+            raw_spread=spread_of(finite, base),
             raw_range=np.stack([np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)]),
             basis=basis,
             shift=shift,
