@@ -45,6 +45,10 @@ def test_a_straight_line_is_carried_on_and_a_plane_needs_three_places() -> None:
     at = np.array([0.3, 0.6])
     assert line_weights(corners, at) == pytest.approx([0.1, 0.3, 0.6])
     assert line_weights(corners[:2], at) is None
+    # A definition's number is an input, and the same under all conditions.
+    defined = np.column_stack([known, np.full(4, 0.7)])
+    assert line_weights(defined, np.array([0.1, 0.7])) == pytest.approx([0.75, 0.125, 0.125, 0.0])
+    assert line_weights(defined, np.array([0.1, 0.6])) is None
 
 
 def groups(seed: int, *, offset: float) -> list[Group]:

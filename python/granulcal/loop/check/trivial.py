@@ -6,8 +6,9 @@ $$ \hat y_\mathrm{nearest} = \bar y_{h^*}, \qquad \hat y_\mathrm{line} = \sum_h 
    \hat y_\mathrm{residual} = \bar x_c + \sum_h w_h (\bar y_h - \bar x_h) $$
 
 $w$ are the weights of the straight line between the neighbours of c, which is carried on beyond the
-outermost two; with more inputs than one those of the least-squares plane; where the conditions span
-neither, the nearest condition has weight 1. $D^2$ of a row is that of `distance.py`: the squared
+outermost two; with more inputs than one those of the least-squares plane. An input that has one
+value in all of them, as those of definitions, is none here. Where the conditions span neither, the
+nearest condition has weight 1. $D^2$ of a row is that of `distance.py`: the squared
 distance without the noise of $\bar y_c$ and of the row itself.
 
 The last row asks more than it seems: it knows the base model and what was measured, and so all that
@@ -101,8 +102,11 @@ def line_weights(known: Array, at: Array) -> Array | None:
     """Returns the weights (H,) of a straight line through `known` (H, q) at `at` (q,).
 
     None where the conditions do not span one: fewer than two places, or fewer than q + 1 of them
-    in general position.
+    in general position, q being the inputs in which they or c differ.
     """
+    differs = np.any(np.abs(known - at) > _SAME, axis=0)
+    if differs.any():
+        known, at = known[:, differs], at[differs]
     if known.shape[1] == 1:
         places, index = np.unique(known[:, 0], return_inverse=True)
         if len(places) < 2:
