@@ -249,6 +249,19 @@ def test_two_effects_of_the_image_are_read_together(tmp_path: Path) -> None:
         assert rows.x[row, lone] <= plain[0, lone]
 
 
+def test_numbers_of_definitions_are_drawn_at_the_conditions_alone_as_well(tmp_path: Path) -> None:
+    level = "camera.height_threshold", 1e-3, 2e-3
+    plain = plan(tmp_path, "camera.blur")
+    asked = replace(plain, conditions=(*plain.conditions, level), base=8)
+    archive = Archive(
+        tmp_path / "archive", replace(asked, places=({"start.base": 0.03}, {"start.base": 0.05}))
+    )
+    archive.fill(threads=1, say=lambda _: None, progress=False)
+    height, drawn = archive.pours().condition.T
+    assert set(height) == {0.0, 1.0}
+    assert len(np.unique(drawn)) == 8 and 0 < drawn.min() < drawn.max() < 1
+
+
 def test_the_forward_run_has_the_fault(tmp_path: Path, pour: gc.Pour) -> None:
     forward = Forward(tmp_path, 1)
     plain, moved = (forward.pours(pour.scene, [4], f) for f in ({}, {"offset": 5e-4}))

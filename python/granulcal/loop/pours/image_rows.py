@@ -157,7 +157,8 @@ class ImageRows:
             for u, (p, low, high) in zip(unit, self.conditions, strict=True)
         }
         if self.places:
-            at = self.places[row % len(self.places)]
+            # Numbers of definitions are in no place, and drawn there as well.
+            at |= self.places[row % len(self.places)]
             unit = np.array([(at[p] - low) / (high - low) for p, low, high in self.conditions])
         numbers = {**self.prior.fixed, **values, **at}
         found = {"theta": theta, "condition": unit}
