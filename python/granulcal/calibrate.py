@@ -134,7 +134,9 @@ def calibrate(
     formations = [recording.formation(**options) for recording in recordings]
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])
     require_different(observed)
-    known = np.hstack([observed, _diagnostics(formations, data.scene, diagnostics)])
+    # A height map does not say where the axis was, about which those of pours are.
+    axes = [None if each.depth is None else (0.0, 0.0) for each in recordings]
+    known = np.hstack([observed, _diagnostics(formations, axes, data.scene, diagnostics)])
     return _told(
         model,
         data,
@@ -252,13 +254,19 @@ def _told(
 
 
 def _diagnostics(
-    formations: Sequence[Formation], scene: Scene, names: Sequence[str]
+    formations: Sequence[Formation],
+    axes: Sequence[tuple[float, float] | None],
+    scene: Scene,
+    names: Sequence[str],
 ) -> NDArray[np.float64]:
-    """Returns these diagnostic statistics of each formation, shape (k, len(names))."""
+    """Returns these diagnostic statistics of each formation about its axis, (k, len(names))."""
     if not names:
         return np.empty((len(formations), 0))
     diameter = scene.get("grains.diameter")
-    found = [each.diagnostic_statistics(grain_diameter=diameter) for each in formations]
+    found = [
+        each.diagnostic_statistics(grain_diameter=diameter, pour_axis=axis)
+        for each, axis in zip(formations, axes, strict=True)
+    ]
     return np.array([[row[name] for name in names] for row in found])
 
 
