@@ -15,6 +15,7 @@ from granulcal import loop
 from granulcal.cli import main
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.analysis import Analysis
+from granulcal.loop.check.prior_pours import prior_pours
 from granulcal.loop.close import planned
 from granulcal.loop.effects.library import FUNNEL, by_name, fingerprint
 from granulcal.loop.pours.archive import Archive, ArchivePlan
@@ -246,6 +247,24 @@ def test_further_pours_are_where_the_fits_are(tilted: Path, tmp_path: Path) -> N
     assert lean > 4 * base.x[:, where].std() / len(base.x) ** 0.5
     again = further(analysis, found, 0)
     assert forward.ran == 48 and np.array_equal(again[1].x, tilts.x)
+
+
+def test_a_random_draw_is_poured_anew_under_each_condition(tilted: Path) -> None:
+    # Pours of one seed under two conditions scatter together (0.6), and count as two.
+    task, asked = Task.load(tilted), []
+    size = len(Measures.of(task.scene).names)
+
+    def pours(_: Any, seeds: list[int], __: Any) -> np.ndarray:
+        asked.extend(seeds)
+        return np.zeros((1, size))
+
+    forward: Any = SimpleNamespace(pours=pours)
+    analysis = Analysis(task, planned(task, 1100, 0), forward, Thresholds(), 0, print)
+    measured = {condition.name: np.ones((2, size)) for condition in analysis.fitted}
+    found: Any = SimpleNamespace(best=SimpleNamespace(effects=("tilt.y",)))
+    seen = prior_pours(analysis, found, measured, np.ones(16), 0)
+    assert len(set(asked)) == len(asked) == 24 * len(analysis.fitted)
+    assert len(seen.squares) == 24 and seen.squares == pytest.approx(16)
 
 
 def test_a_budget_that_is_too_small_says_what_is_enough(

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from granulcal.loop.analysis import Analysis
 from granulcal.loop.effects.design import Design, normal_from_cube
+from granulcal.loop.pours.replicates import seed_under
 from granulcal.loop.pours.rows import Rows
 from granulcal.loop.pours.scenes import faults_of, scene_of
 from granulcal.loop.surrogate.baseline import Start
@@ -107,7 +108,7 @@ def prior_pours(
             sizes = {0.0: scene} | ({1.0: scene.with_(coarse.numbers)} if coarse else {})
             seen = []
             for size, sized in sizes.items():
-                x = analysis.forward.pours(sized, [first + i], faults)
+                x = analysis.forward.pours(sized, [seed_under(condition, first + i)], faults)
                 if len(x) == 0:
                     continue
                 psi = np.where(held, size, 0.0)
