@@ -26,7 +26,7 @@ from granulcal.loop.surrogate.blocks import fit_blocks
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.loop.test.distance import noise_free_square
-from granulcal.loop.test.refit import fit_single
+from granulcal.loop.test.refit import fit_pair, fit_single
 from granulcal.loop.test.residual_test import residual_test
 from granulcal.loop.test.score import Scores
 
@@ -317,6 +317,19 @@ def test_power_grows_with_pours(surrogate: Surrogate) -> None:
     # What the surrogate does not know does not average away.
     assert (many.detectable > few.detectable / np.sqrt(10)).all()
     json.dumps(many.to_dict(), allow_nan=False)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_pair_says_at_which_end_a_strength_leans(
+    toy: Linear, surrogate: Surrogate, sign: int
+) -> None:
+    seen = toy.observe(np.array([0.5, 0.4]), np.array([0.5, 0.0, 1.3 * sign]), 3)
+    stack = StackedMeans.of(surrogate, seen)
+    local, base = fit_base(surrogate, stack, 0)
+    target = stack.means.ravel()
+    alone = fit_single(local, target, base, 0, RULES)
+    found = fit_pair(local, target, base, alone.fit, (0, 2), RULES)
+    assert found.at_end and found.fit.psi[2] == sign and abs(found.fit.psi[0]) < 0.98
 
 
 def test_a_nuisance_is_never_found(toy: Linear) -> None:

@@ -228,7 +228,7 @@ def fit_pair(
         log_evidence + float(np.log(left / count)),
         used.mean(axis=0),
         np.quantile(used, [tail, 1 - tail], axis=0).T,
-        bool((centre > 0.98).any()),
+        bool((np.where(low < 0, abs(centre), centre) > 0.98).any()),
         np.empty((2, 0)),
     )
 
