@@ -2,6 +2,7 @@ import os
 import pickle
 import stat
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -74,6 +75,22 @@ def test_a_batch_can_be_extended_and_cut(small_scene, tmp_path):
         batch(9, resume=False)
     with pytest.raises(ValueError, match="the seed is 0, but 1 is given"):
         batch(9, seed=1)
+
+
+def test_what_goes_to_another_process_has_the_rows_of_what_was_sent(
+    small_scene: gc.Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    prior = gc.Prior.default()
+    gc.generate(small_scene, prior, 4, out="pours", progress=False)
+    first = gc.generate(small_scene, prior, 2, out="pours", progress=False)
+    sent = pickle.dumps(first), pickle.dumps(gc.Dataset.load("pours"))
+    # A worker need not stand where the folder was named from.
+    monkeypatch.chdir("/")
+    two, four = map(pickle.loads, sent)
+    np.testing.assert_array_equal(two.x, first.x)
+    assert len(four) == 4
+    assert len(pickle.loads(pickle.dumps(two))) == 2
 
 
 def test_an_exception_in_progress_stops_the_batch(small_scene, tmp_path):

@@ -59,9 +59,11 @@ class Dataset:
         health: penetration, residuals, energy, losses and times of each pour, by name.
     """
 
-    def __init__(self, native: _native.Dataset, path: Path) -> None:
+    def __init__(self, native: _native.Dataset, path: Path, rows: int | None = None) -> None:
         self._native = native
         self.path = path
+        # Wherever whoever opens it again stands, and of a longer batch no more than this has.
+        self._place, self._rows = path.absolute(), rows
         self.row = native.row
         self.theta = native.theta
         self.theta_names: tuple[str, ...] = tuple(native.theta_names)
@@ -167,7 +169,7 @@ class Dataset:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # To another process goes where it lies.
-        return Dataset.load, (self.path,)
+        return _opened, (self._place, self._rows)
 
     def _repr_html_(self) -> str:
         from granulcal.html import page
@@ -184,6 +186,13 @@ class Dataset:
     def __repr__(self) -> str:
         counts = ", ".join(f"{n} {status}" for status, n in self.status_counts().items())
         return f"Dataset({len(self)} pours: {counts}; {', '.join(self.theta_names)})"
+
+
+def _opened(path: Path, rows: int | None) -> Dataset:
+    """Returns the data set at a path, of a folder its first `rows` rows if that is a number."""
+    if rows is None:
+        return Dataset.load(path)
+    return Dataset(_native.Dataset.open(path, rows), path, rows)
 
 
 def _asked(engine: Engine) -> Callable[[_native.Scene, int], Any]:
@@ -285,4 +294,4 @@ def generate(
     finally:
         if line is not None:
             line.close()
-    return Dataset(_native.Dataset.open(folder, n), folder)
+    return Dataset(_native.Dataset.open(folder, n), folder, n)
