@@ -201,11 +201,11 @@ def _inferred(
                 progress=progress,
             )
     except TrainingDataError as error:
-        left_out = pours.left_out(budget)
+        left_out = pours.left_out(budget, names)
         if left_out.total == 0:
             raise
         raise TrainingDataError(f"{error}. Not usable: {left_out}{left_out.advice}") from None
-    return replace(found, left_out=pours.left_out(len(found.x)))
+    return replace(found, left_out=pours.left_out(len(found.x), names))
 
 
 def _require_fits(prior: Prior, scene: Scene) -> None:

@@ -1,5 +1,6 @@
 """Rounds of simulations for one observation."""
 
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -10,6 +11,7 @@ pytest.importorskip("torch")
 import granulcal as gc
 from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.bayessim.training.sequential import infer_within_budget, round_sizes
+from granulcal.engines import CallableEngine
 from granulcal.errors import ObservationError, PriorError, TrainingDataError
 from granulcal.parameter import Parameter
 from granulcal.pours.kept_pours import KeptPours
@@ -121,6 +123,30 @@ def test_pours_are_kept_and_never_made_twice(tmp_path):
     file.write_text("{")
     with pytest.raises(ValueError, match="truncated or not JSON"):
         KeptPours(scene, prior, file)
+
+
+def test_pours_of_which_not_all_is_seen_are_gone_on_with(tmp_path: Path) -> None:
+    prior, file = Prior.default(), tmp_path / "pours.json"
+    plain = Scene.drop(0.02, count=20).to_toml()
+    scene = Scene.from_toml(
+        f"{plain}\n[observe]\nrate = 10.0\n[observe.front]\ntimes = [0.1]\n"
+        "[observe.radius]\npercentiles = [50.0]\n"
+    )
+    # Of another simulator the grains at rest are known, and no front on the way.
+    still = CallableEngine(lambda scene, seed: scene.start(seed), name="not moved")
+    theta, again = prior.sample(2, seed=1), []
+    for _ in range(2):
+        pours = KeptPours(scene, prior, file, threads=1, observed=True, engine=still)
+        again.append((pours.kept_of(theta), pours(theta, 0)))
+        seen = np.isfinite(again[-1][1]).all(axis=0)
+        assert dict(zip(pours.x_names, seen, strict=True)) == {
+            "front_radius[0.1]": False, "front_radius[end]": False, "radius[50]": True
+        }  # fmt: skip
+        assert pours.left_out(2).unseen == 2 and pours.left_out(2, ("radius[50]",)).total == 0
+        del pours
+    (first, made), (second, kept) = again
+    assert (first, second) == (0, 2)
+    np.testing.assert_array_equal(made, kept)
 
 
 def test_a_folder_is_of_one_observation(tmp_path):

@@ -88,7 +88,7 @@ def design_spill(
     resumed = len(kept.rows)
     if line is not None:
         kept.progress = lambda done: line(
-            pours, resumed, done - resumed, *kept.left_out(pours).counts
+            pours, resumed, done - resumed, *kept.left_out(pours, (SPILLED,)).counts
         )
     Path(out).mkdir(parents=True, exist_ok=True)
     try:
@@ -107,7 +107,7 @@ def design_spill(
         grains=grains,
         names=names,
         seed=seed,
-        unusable=kept.left_out(pours),
+        unusable=kept.left_out(pours, (SPILLED,)),
     )
 
 

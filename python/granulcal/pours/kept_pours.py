@@ -11,7 +11,7 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -44,7 +44,7 @@ __all__ = ["KeptPours"]
 Array = NDArray[np.float64]
 
 _POUR = Table(
-    {"theta": ListOf(Number(), least=1), "status": Text(), "x": Maybe(ListOf(Number()))},
+    {"theta": ListOf(Number(), least=1), "status": Text(), "x": Maybe(ListOf(Maybe(Number())))},
     {"cpu_s": Number()},
 )
 _SCHEMA = Table(
@@ -142,10 +142,19 @@ class KeptPours:
         """Returns how many of the pours at `theta` (b, p), from the first on, are kept already."""
         return sum(self._is_kept(i, row) for i, row in enumerate(theta))
 
-    def left_out(self, count: int) -> LeftOut:
-        """Returns how many of the first `count` pours that are kept cannot be used, by why."""
+    def left_out(self, count: int, needed: Sequence[str] | None = None) -> LeftOut:
+        """Returns how many of the first `count` pours that are kept cannot be used, by why.
+
+        Args:
+            count: pours.
+            needed: names of the statistics that a pour must have; all if None.
+        """
         kept = [row for index, row in list(self.rows.items()) if int(index) < count]
-        usable = [row["x"] is not None and np.isfinite(row["x"]).all() for row in kept]
+        places = [self.x_names.index(name) for name in needed or self.x_names]
+        usable = [
+            row["x"] is not None and all(row["x"][place] is not None for place in places)
+            for row in kept
+        ]
         return LeftOut.of([row["status"] for row in kept], usable)
 
     def _is_kept(self, index: int, theta: Array) -> bool:
@@ -197,7 +206,7 @@ def _poured(
         if not isinstance(left, tuple):
             if look is not Pour.statistics:
                 raise ValueError(f"{engine.name} gave points of a surface and no grains")
-            x = np.asarray(statistics(left)).tolist()
+            x = _numbers(statistics(left))
             return {"theta": theta.tolist(), "status": "at_rest", "x": x}
         pour = Pour(scene.native.pour_of(*left, seed), scene, seed)
     else:
@@ -205,12 +214,18 @@ def _poured(
     status, x = pour.status, None
     if status not in UNUSABLE:
         try:
-            x = np.asarray(look(pour), float).tolist()
+            x = _numbers(look(pour))
         except ValueError:
             status = NO_GRAINS
     row = {"theta": theta.tolist(), "status": status, "x": x}
     # Nobody knows the time of another engine.
     return {**row, "cpu_s": pour.cpu_seconds} if math.isfinite(pour.cpu_seconds) else row
+
+
+def _numbers(values: ArrayLike) -> list[float | None]:
+    """Returns statistics for JSON, None for what could not be seen: it has no NaN."""
+    each = np.asarray(values, float).tolist()
+    return [value if math.isfinite(value) else None for value in each]
 
 
 def _hash(rows: dict[str, dict]) -> str:
