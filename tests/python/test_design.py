@@ -126,6 +126,18 @@ def test_extrapolation_is_refused_or_flagged(line):
         gc.design_rings(line, [gc.Ring(outer=0.005)], extrapolate=True)
 
 
+@pytest.mark.parametrize(("outer", "inner"), [(0.1, None), (0.2, None), (0.1, 0.04), (0.2, 0.08)])
+def test_a_ring_wider_than_where_the_radii_turn_is_at_no_height(
+    outer: float, inner: float | None
+) -> None:
+    """The tangent at the lowest height had led among the pours, or past the highest of them."""
+    data = _Bow()
+    model = RingModel(gc.BayesSim.fit(data, quiet=True, method="emulated"), data)  # pyright: ignore
+    for extrapolate in (False, True):
+        with pytest.raises(ExtrapolationError, match="the trend at its end leads away from it"):
+            gc.design_rings(model, [gc.Ring(outer=outer, inner=inner)], extrapolate=extrapolate)
+
+
 def test_radii_that_no_height_gives_are_refused(line):
     with pytest.raises(UnreachableRingError, match=r"the nearest, .* give from 1\.\d+ / 3\.\d+ to"):
         gc.design_rings(line, [gc.Ring(outer=0.08, inner=0.07)])

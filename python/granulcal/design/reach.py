@@ -116,13 +116,23 @@ class Reach:
         i = int(np.argmin(np.abs(radii[:, 1] - outer)))
         return float(radii[i, 0])
 
+    def nearer_end(self, radii: Array) -> float:
+        """Returns the end of the pours' range whose radii are nearer to `radii` (2,) [m]."""
+        return min((self.low, self.high), key=lambda h: np.linalg.norm(self.at(h).radii - radii))
+
+    def is_beyond(self, end: float, height: float) -> bool:
+        """Returns whether a height lies outside the range on the side of this end."""
+        return height > self.high if end == self.high else height < self.low
+
     def beyond(self, radii: Array) -> float:
-        """Returns the height outside the range whose tangent comes closest to `radii` [m].
+        """Returns the height at which the tangent at the nearer end comes closest to `radii` [m].
+
+        It lies outside the range if it `is_beyond` that end.
 
         Args:
             radii: inner and outer radius [m], shape (2,).
         """
-        nearest = min((self.low, self.high), key=lambda h: np.linalg.norm(self.at(h).radii - radii))
+        nearest = self.nearer_end(radii)
         end = self.beside(nearest)
         weight = np.linalg.solve(end.covariance, end.slope)
         return nearest + float(weight @ (radii - end.radii) / (weight @ end.slope))

@@ -169,19 +169,23 @@ def _nearest(reach: Reach, wanted: Array, mean: float) -> tuple[float, bool]:
 
 
 def _extrapolated(reach: Reach, ring: Ring, order: int, allowed: bool) -> PlannedPour:
-    end = min(
-        (reach.beside(reach.low), reach.beside(reach.high)),
-        key=lambda e: abs(e.radii[1] - ring.outer),
+    from_end = min(
+        (reach.low, reach.high), key=lambda h: abs(reach.beside(h).radii[1] - ring.outer)
     )
+    end = reach.beside(from_end)
     if ring.inner is None:
         height = end.height + (ring.outer - end.radii[1]) / end.slope[1]
     else:
-        height = reach.beyond(np.array([ring.inner, ring.outer]))
+        radii = np.array([ring.inner, ring.outer])
+        height, from_end = reach.beyond(radii), reach.nearer_end(radii)
     outer = sorted(each.radii[1] for each in reach.curve())
     told = (
         f"a {ring} lies outside the training: heights of {_centimetres(reach.low, reach.high)} "
         f"give outer radii of {_centimetres(outer[0], outer[-1])}"
     )
+    # Where the radii have turned within the training the tangent goes back into it.
+    if not reach.is_beyond(from_end, height):
+        raise ExtrapolationError(f"{told}; the trend at its end leads away from it")
     if not allowed:
         raise ExtrapolationError(
             f"{told}; the trend at its end would reach it at {100 * height:.1f} cm: train on "
