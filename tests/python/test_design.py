@@ -39,7 +39,7 @@ class _Line:
         self.status = np.full(count, "at_rest")
         self.is_usable = np.ones(count, bool)
         self.left_out = LeftOut()
-        self.law = _native.LAW
+        self.law, self.base_seed = _native.LAW, 0
 
     @staticmethod
     def radii(heights):
@@ -268,3 +268,15 @@ def test_command_trains_plans_and_resumes(tmp_path):
     )
     assert "a trained model has its material" in refused.stderr
     assert granulcal("design", *words).returncode == 2
+    # With seed 5 the pours of the training are those of the check by 4.
+    data = gc.Dataset.load(out / "model" / "training.parquet")
+    again = gc.generate(data.scene, data.prior, 60, seed=5, out=tmp_path / "pours", progress=False)
+    gc.BayesSim.fit(again, quiet=True, method="emulated").save(tmp_path / "other")
+    again.save(tmp_path / "other" / "training.parquet")
+    checked = ["rings", str(tmp_path / "other"), "--seed", "4", "--held-out", "3"]
+    done = granulcal("design", *checked, "-o", str(tmp_path / "check"))
+    assert done.returncode == 0, done.stderr
+    held_out = gc.Dataset.load(tmp_path / "check" / "held-out")
+    assert not np.isin(held_out.theta, again.theta).any()
+    with pytest.raises(ValueError, match="seed must be another than that of the training's pours"):
+        RingModel.load(tmp_path / "other").held_out(3, seed=5)

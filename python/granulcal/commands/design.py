@@ -243,9 +243,10 @@ def _rings(options: argparse.Namespace) -> int:
     print(model, file=sys.stderr if options.json else sys.stdout)
     unusable = model.unusable
     if options.held_out is not None:
-        # Seeds of the training and of its check must differ.
+        # Seeds of the training and of its check must differ: a folder's own may be any.
+        seed = next(options.seed + i for i in (1, 2) if options.seed + i != model.seed)
         held_out = model.held_out(
-            options.held_out, seed=options.seed + 1, out=options.out, threads=options.threads
+            options.held_out, seed=seed, out=options.out, threads=options.threads
         )
         print(held_out, file=sys.stderr if options.json else sys.stdout)
         unusable += held_out.unusable

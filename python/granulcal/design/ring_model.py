@@ -83,6 +83,7 @@ class RingModel:
         scene: the scene of the pours; its material is that of the plan.
         pour_count: pours simulated, the unusable ones too.
         unusable: those, by why.
+        seed: of the pours' data set.
     """
 
     def __init__(self, bayes: "BayesSim", data: Dataset) -> None:
@@ -97,7 +98,7 @@ class RingModel:
                 f"{', '.join(bayes.prior.names)} from {', '.join(bayes.x_names)}"
             )
         self.bayes, self.scene, self.pour_count = bayes, data.scene, len(data)
-        self.unusable = data.left_out
+        self.unusable, self.seed = data.left_out, data.base_seed
         usable = data.is_usable
         self.reach = Reach(data.theta[usable, 0], data.x[usable])
 
@@ -193,16 +194,18 @@ class RingModel:
 
         Args:
             count: usable pours, at least two; others are made and counted besides.
-            seed: another one than that of the training.
+            seed: another one than that of the training's pours, which would be made again.
             out: folder of a ring model; its subfolder `held-out` keeps the pours.
             threads: pours at once.
             progress: show pours on stderr.
 
         Raises:
-            ValueError: fewer than two.
+            ValueError: fewer than two, or the seed of the training's pours.
         """
         if count < _FEWEST_HELD_OUT:
             raise ValueError(f"count must be at least {_FEWEST_HELD_OUT}, got {count}")
+        if seed == self.seed:
+            raise ValueError(f"seed must be another than that of the training's pours, got {seed}")
         folder = None if out is None else Path(out) / _HELD_OUT
         wanted, data = count, None
         while data is None or data.is_usable.sum() < count:
