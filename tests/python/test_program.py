@@ -291,6 +291,32 @@ def test_a_dry_run_of_training_and_check_says_how_long_and_makes_nothing(
     assert told["posteriors"] == small_data.is_usable.sum() and told["seconds"] > 0
 
 
+def test_pours_beside_a_model_that_was_saved_over_another_are_not_taken_for_its_own(
+    small_data: gc.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    """They had been: pours that it was trained on could check it, and a report was of others."""
+    pytest.importorskip("torch")
+    model, pours = tmp_path / "model", str(small_data.path)
+    (tmp_path / "x.bag").write_bytes(b"")
+    words = ["report", str(model), str(tmp_path / "x.bag"), "-o", str(tmp_path / "page.html")]
+    for asked, sign in ((80, 1.0), (70, 1.0), (80, -1.0)):
+        x = sign * small_data.x[:asked]
+        made = gc.BayesSim.fit(
+            small_data.theta[:asked], x, small_data.prior, x_names=small_data.x_names,
+            scene=small_data.scene, quiet=True, method="emulated",
+        )  # fmt: skip
+        made.save(model)
+        if asked == 80 and sign > 0:
+            small_data.save(model / "training.parquet")
+            assert main([*words, "--dry-run"]) == 0
+            continue
+        for refused in (words, ["check", str(model), "--data", pours]):
+            capsys.readouterr()
+            assert main(refused) == 2
+            assert "training.parquet has other pours than the model" in capsys.readouterr().err
+    assert main([*words, "--data", pours, "--dry-run"]) == 0
+
+
 def test_a_dry_run_of_a_report_counts_its_pours(
     small_data: gc.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:

@@ -76,6 +76,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _pairs(options: argparse.Namespace, model: "BayesSim") -> "TrainingPairs":
     from granulcal.bayessim.model import FEWEST_TO_CHECK
+    from granulcal.bayessim.training.own_pours import require_own_pours
     from granulcal.bayessim.training.pairs import TrainingPairs
     from granulcal.calibrate import require_same_scene
     from granulcal.pours.dataset import Dataset
@@ -91,7 +92,9 @@ def _pairs(options: argparse.Namespace, model: "BayesSim") -> "TrainingPairs":
         )
     training = model_named(options.model) / TRAINING
     if training.exists():
-        _require_unseen(options, pairs, Dataset.load(training))
+        seen = Dataset.load(training)
+        require_own_pours(model, seen, training)
+        _require_unseen(options, pairs, seen)
     return pairs
 
 

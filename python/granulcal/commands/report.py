@@ -56,6 +56,7 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     from granulcal.bayessim.storage.model_document import read_model_document
+    from granulcal.bayessim.training.own_pours import require_own_pours
     from granulcal.calibrate import require_same_scene
     from granulcal.pours.dataset import Dataset
     from granulcal.starter.models import model_named
@@ -78,6 +79,8 @@ def _run(options: argparse.Namespace) -> int:
         raise FileNotFoundError(f"{folder} came without its training pours: {told}")
     data = Dataset.load(training)
     require_same_scene(model, data.scene)
+    if options.data is None:
+        require_own_pours(model, data, training)
     if options.dry_run:
         # At the mode, at the prior's mean, at draws.
         pours = 2 * options.seeds + (0 if is_of_observed else options.draws)

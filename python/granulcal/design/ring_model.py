@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.bayessim.storage.place import require_place
+from granulcal.bayessim.training.own_pours import require_own_pours
 from granulcal.design.reach import Reach
 from granulcal.design.ring import PERCENTILES, STATISTICS
 from granulcal.errors import TrainingDataError
@@ -173,13 +174,15 @@ class RingModel:
 
         Raises:
             FileNotFoundError: the folder or its training data does not exist.
-            TrainingDataError: it is a model of something else.
+            TrainingDataError: it is a model of something else, or of other pours.
         """
         from granulcal.bayessim import BayesSim
 
         inside = Path(path) / _MODEL
         folder = inside if inside.is_dir() else Path(path)
-        return cls(BayesSim.load(folder), Dataset.load(folder / _TRAINING))
+        bayes, data = BayesSim.load(folder), Dataset.load(folder / _TRAINING)
+        require_own_pours(bayes, data, folder / _TRAINING)
+        return cls(bayes, data)
 
     def held_out(
         self,
