@@ -25,6 +25,9 @@ def test_columns_are_read_by_name(tmp_path: Path) -> None:
     found = read_grains(tmp_path, 0.002)
     assert found is not None
     assert found[0].tolist() == [[0.1, 0.2, 0.3]] and found[1].tolist() == [0.004]
+    file.write_text("z,x,y\n\n0.3,0.1,0.2,\n")
+    found = read_grains(tmp_path, 0.002)
+    assert found is not None and found[0].tolist() == [[0.1, 0.2, 0.3]]
     file.write_text("z,x,y\n")
     found = read_grains(tmp_path, 0.002)
     assert found is not None and found[0].shape == (0, 3)
@@ -40,6 +43,8 @@ def test_columns_are_read_by_name(tmp_path: Path) -> None:
         ("grains.csv", "x,y\n1,2\n"),
         ("grains.csv", "0.1,0.2,0.002\n0.1,0.3,0.002\n"),
         ("grains.csv", "x,y,z,z\n1,2,3,4\n"),
+        # Of decimal commas the second number had been 12 m, and the third 0.
+        ("grains.csv", "x,y,z\n0,012,0,034,0,056\n"),
         ("grains.dump", "no dump"),
         ("grains.dump", "ITEM: ATOMS id x y z radius\n1 2 3\n"),
         ("grains.npy", "no array"),

@@ -10,7 +10,7 @@ from own_simulators import cone
 
 import granulcal as gc
 from granulcal.engines import CallableEngine, CommandEngine, ExportedEngine, engine_named
-from granulcal.engines.protocol import UnlikeGrainsWarning
+from granulcal.engines.protocol import FewerGrainsWarning, UnlikeGrainsWarning
 
 
 def test_a_command_makes_a_pour_with_the_scenes_camera(
@@ -124,6 +124,18 @@ def test_a_command_that_fails_says_why(small_scene: gc.Scene, tmp_path: Path) ->
         CommandEngine("nonesuch-engine")(small_scene, 0)
 
 
+def test_a_command_may_say_what_it_likes(small_scene: gc.Scene, tmp_path: Path) -> None:
+    """Bytes that are no UTF-8 had stopped the batch, though the grains were there."""
+    loud = tmp_path / "loud.py"
+    loud.write_text(
+        "import pathlib, sys\nsys.stdout.buffer.write(b'\\xb5 = 0.4\\n')\n"
+        "(pathlib.Path(sys.argv[-1]) / 'grains.csv').write_text('x,y,z\\n0,0,0.002\\n')\n"
+    )
+    with pytest.warns(FewerGrainsWarning):
+        centres, _ = CommandEngine(f"{sys.executable} {loud}")(small_scene, 0)
+    assert np.asarray(centres).tolist() == [[0.0, 0.0, 0.002]]
+
+
 def test_engines_are_named(own_simulator: str) -> None:
     assert engine_named(own_simulator).name == own_simulator
     assert engine_named("granulcal.pours.scene:Scene").name == "granulcal.pours.scene:Scene"
@@ -136,8 +148,6 @@ def test_engines_are_named(own_simulator: str) -> None:
 
 
 def test_an_engine_of_ones_own_with_fewer_grains_is_warned_of_once(small_scene: gc.Scene) -> None:
-    from granulcal.engines.protocol import FewerGrainsWarning
-
     def lossy(scene: gc.Scene, seed: int) -> tuple[np.ndarray, float]:
         return scene.start(seed)[0][:50], 0.002
 

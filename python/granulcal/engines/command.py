@@ -50,6 +50,8 @@ class CommandEngine:
                     [*self.words, str(folder)],
                     capture_output=True,
                     text=True,
+                    # Words for people; what counts is in the folder.
+                    errors="replace",
                     check=False,
                     timeout=self.timeout_s,
                 )

@@ -130,6 +130,8 @@ class ExportedEngine:
             cwd=folder,
             capture_output=True,
             text=True,
+            # Words for people; what counts is in the folder.
+            errors="replace",
             check=False,
             env=_surroundings(self.words[0]),
         )

@@ -62,11 +62,23 @@ def _csv(path: Path) -> Array:
         )
     if not rest.strip():
         return np.empty((0, len(wanted)))
+    _require_columns(path, rest, len(names))
     columns = [names.index(name) for name in wanted]
     try:
         return np.loadtxt(io.StringIO(rest), delimiter=",", usecols=columns, ndmin=2)
     except ValueError as error:
         raise ValueError(f"{path}: not a table of numbers: {error}") from None
+
+
+def _require_columns(path: Path, rows: str, count: int) -> None:
+    """Refuses rows with more numbers than there are names: with decimal commas each is two."""
+    for number, row in enumerate(rows.splitlines(), start=2):
+        found = len(row.partition("#")[0].rstrip(", \t").split(","))
+        if found > count:
+            raise ValueError(
+                f"{path}: line {number} must have {count} numbers with decimal points, commas "
+                f"between; got {found}"
+            )
 
 
 def _dump(path: Path) -> Array:
