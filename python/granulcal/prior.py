@@ -121,7 +121,7 @@ class Prior:
             PriorError: the file is not a prior; the message begins with the file's name.
         """
         try:
-            return cls.from_toml(read_bytes(path, most=LARGEST_DOCUMENT).decode("utf-8"))
+            return cls.from_toml(read_bytes(path, most=LARGEST_DOCUMENT).decode("utf-8-sig"))
         except (PriorError, UnicodeDecodeError) as error:
             raise PriorError(f"{path}: {error}") from None
 

@@ -19,6 +19,7 @@ from granulcal.documents import (
     check,
     meant,
     parse_json,
+    parse_toml,
     read_bytes,
 )
 from granulcal.errors import ObservationError
@@ -65,6 +66,11 @@ def test_what_is_no_json_is_refused_by_name(text):
 
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no device has this name")
+def test_the_mark_of_an_editor_is_skipped():
+    assert parse_json(b'\xef\xbb\xbf{"a": 1}', "x.json") == {"a": 1}
+    assert parse_toml(b"\xef\xbb\xbfa = 1\n", "x.toml") == {"a": 1}
+
+
 def test_devices_are_refused():
     with pytest.raises(ValueError, match="device or pipe"):
         read_bytes("/dev/zero")

@@ -187,6 +187,9 @@ def test_a_discharge_curve_gives_shares_and_rate(scene: gc.Scene, tmp_path: Path
     # A balance swings: measured curves fall by a tenth of a percent.
     path.write_text("\n".join([rows[0], "a,0,-0.2", "a,1,50", "a,2,49.9", "a,3,100.3"]) + "\n")
     assert len(DischargeCurve.open(path).time) == 4
+    # As a spreadsheet writes it: a mark before the text, and an empty line at its end.
+    path.write_text(f"\ufeff{rows[0]}\r\na,0,0\r\na,1,50\r\n\r\n", encoding="utf-8")
+    assert DischargeCurve.open(path).percent.tolist() == [0.0, 50.0]
     path.write_text("time,percent\n0,0\n")
     with pytest.raises(ValueError, match="the columns must be"):
         DischargeCurve.open(path)

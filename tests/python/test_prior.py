@@ -195,6 +195,9 @@ def test_load_names_the_file(tmp_path):
     path = tmp_path / "prior.toml"
     path.write_text(EVERY_KIND)
     assert Prior.load(path) == Prior.from_toml(EVERY_KIND)
+    # As some editors mark their text, and `generate` takes it.
+    path.write_text(EVERY_KIND, encoding="utf-8-sig")
+    assert Prior.load(path) == Prior.from_toml(EVERY_KIND)
     path.write_text("[[parameter")
     with pytest.raises(PriorError, match=r"prior\.toml"):
         Prior.load(path)

@@ -46,12 +46,14 @@ class DischargeCurve:
                 series, or one that falls or hardly begins; the message says what there is.
         """
         points: dict[str, list[tuple[float, float, int]]] = {}
-        with Path(path).open(newline="") as file:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
             rows = csv.reader(file)
-            header = next(rows, [])
+            header = [name.strip() for name in next(rows, [])]
             if header != _HEADER:
                 raise ValueError(f"{path}: the columns must be {_HEADER}, got {header}")
             for number, row in enumerate(rows, start=2):
+                if not row:
+                    continue
                 try:
                     name, time, percent = row
                     point = float(time), float(percent), number

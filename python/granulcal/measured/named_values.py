@@ -23,7 +23,7 @@ def is_of_named_values(path: str | PathLike[str]) -> bool:
     """Returns whether a file is JSON, or a table with the columns statistic and value."""
     if Path(path).suffix.lower() == _JSON:
         return True
-    with Path(path).open(newline="", errors="replace") as file:
+    with Path(path).open(newline="", encoding="utf-8", errors="replace") as file:
         return _words(next(csv.reader(file), [])) == _HEADER
 
 
@@ -57,7 +57,7 @@ class NamedValues:
                 values={n: nothing if v is None else float(v) for n, v in found.items()},
             )
         values: dict[str, float] = {}
-        with where.open(newline="") as file:
+        with where.open(newline="", encoding="utf-8") as file:
             rows = csv.reader(file)
             if (header := _words(next(rows, []))) != _HEADER:
                 raise ValueError(f"{path}: the columns must be {_HEADER}, got {header}")

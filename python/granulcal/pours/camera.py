@@ -69,7 +69,7 @@ class Camera:
         """
         check_real("height", height)
         try:
-            text = read_bytes(path, most=LARGEST_DOCUMENT).decode("utf-8")
+            text = read_bytes(path, most=LARGEST_DOCUMENT).decode("utf-8-sig")
             table = tomllib.loads(text)
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{path}: not valid TOML: {error}") from None
