@@ -3,7 +3,8 @@
 Rolling and torsion: friction coefficients 4 to 6 of a contact of condim 6 are lengths [m], mu R_eff. Of two
 geoms the larger counts, so the grains carry mu_r R / 2 and the ground and walls mu_r R. Restitution: a
 direct `solref` (-stiffness, -damping) at impedance one is a unilateral spring and dashpot per unit of
-effective mass, whose dashpot cannot pull: docs/export.md.
+effective mass, whose dashpot cannot pull: docs/export.md. Of two geoms the larger damping counts. A wall
+whose own would be lost so, smoother than the grains or with more rebound, has the higher `priority`.
 """
 
 import math
@@ -18,7 +19,8 @@ __all__ = ["ENGINE", "NOTES", "UNEQUAL", "material", "mjcf", "scene"]
 ENGINE = "mujoco"
 NOTES = (
     "tangential_restitution has no counterpart: friction in MuJoCo never gives back",
-    "a pair takes the larger friction of its two geoms: a wall smoother than the grains is as rough as they are",
+    "a pair takes the larger friction and the smaller restitution of its two geoms, or those of the higher priority, "
+    "which ground and walls have in a scene that are smoother than the grains or bounce more",
     "friction is regularised: a heap creeps by impratio, which is 10 here",
     "round walls are rings of 24 boxes: MuJoCo's meshes are convex",
     "walls are 4 mm thick: outside a box or a round wall, grains touch it 4 mm farther out",
@@ -48,6 +50,21 @@ def _friction(of: Contact, lever: float) -> str:
     return f"{slide:.6g} {of.torsional_length(lever):.6g} {of.rolling_length(lever):.6g}"
 
 
+def _words(of: Contact, setup: Setup) -> str:
+    """Returns what the ground's and a wall's geom says of its contacts with grains."""
+    k, b = solref(of.restitution)
+    inner, outer = setup.effective_radius, setup.smallest
+    grains = setup.grains
+    is_lost = (
+        of.sliding_friction < grains.sliding_friction
+        or of.restitution > grains.restitution
+        or of.rolling_length(outer) < grains.rolling_length(inner)
+        or of.torsional_length(outer) < grains.torsional_length(inner)
+    )
+    first = 'priority="1" ' if is_lost else ""
+    return f'{first}condim="6" friction="{_friction(of, outer)}" solref="{-k:.6g} {-b:.6g}" solimp="0.99 0.99 0.001"'
+
+
 def material(setup: Setup, young: float | None = None) -> str:
     """Returns time step and defaults of the grains' geoms as MJCF to include: `solref` is of that step."""
     del young
@@ -68,16 +85,10 @@ def _grain(setup: Setup) -> str:
 
 def mjcf(setup: Setup) -> str:
     """Returns the whole pour as MJCF."""
-    radius = setup.smallest
     walls = []
     for body in setup.walls:
-        k, b = solref(body.law.restitution)
-        words = (
-            f'condim="6" friction="{_friction(body.law, radius)}" '
-            f'solref="{-k:.6g} {-b:.6g}" solimp="0.99 0.99 0.001" rgba=".6 .6 .7 .3"'
-        )
+        words = f'{_words(body.law, setup)} rgba=".6 .6 .7 .3"'
         walls += [f"    {geom.format(words=words)}" for geom in _boxes(body.shape, body.path)]
-    k, b = solref(setup.ground.restitution)
     grains = []
     for i, (centre, size) in enumerate(zip(setup.centres, setup.radii, strict=True)):
         x, y, z = centre
@@ -97,9 +108,7 @@ def mjcf(setup: Setup) -> str:
             f"  <default>{_grain(setup)}</default>",
             "  <worldbody>",
             '    <light pos="0 0 1"/>',
-            f'    <geom name="ground" type="plane" size="1 1 .01" condim="6" '
-            f'friction="{_friction(setup.ground, radius)}" '
-            f'solref="{-k:.6g} {-b:.6g}" solimp="0.99 0.99 0.001"/>',
+            f'    <geom name="ground" type="plane" size="1 1 .01" {_words(setup.ground, setup)}/>',
             *walls,
             *grains,
             "  </worldbody>",
