@@ -1,8 +1,11 @@
 """Model files: the same to the bit, and damage named."""
 
 import json
+import os
 import pickle
 import shutil
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -42,6 +45,31 @@ def test_save_and_load_are_identical_to_the_bit(quick, toy, tmp_path):
     for name in ("model.json", "weights.safetensors"):
         first, second = (tmp_path / folder / name for folder in ("model", "again"))
         assert first.read_bytes() == second.read_bytes()
+
+
+@pytest.mark.parametrize("done", [1, 2, 3])
+def test_a_save_that_is_stopped_leaves_a_model_and_all_other_files(
+    quick: BayesSim, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, done: int
+) -> None:
+    """Ctrl-C between two renames had removed the old model and the new one, or the pours beside."""
+    folder, renamed = tmp_path / "model", []
+    quick.save(folder)
+    for name in ("training.parquet", "coverage.png"):
+        (folder / name).write_bytes(name.encode())
+
+    def rename(old: Path, new: Path, real: Callable[..., None] = os.rename) -> None:
+        real(old, new)
+        renamed.append(new)
+        if len(renamed) == done:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("granulcal.bayessim.storage.model_folder.os.rename", rename)
+    with pytest.raises(KeyboardInterrupt):
+        quick.save(folder)
+    monkeypatch.undo()
+    there = sorted(path for path in tmp_path.rglob("*.*") if path.is_file())
+    assert BayesSim.load(folder).prior == quick.prior
+    assert {"training.parquet", "coverage.png"} <= {path.name for path in there}
 
 
 def _cut(folder, name):

@@ -62,14 +62,12 @@ def save_model(model: Trained, path: str | PathLike[str], *, compact: bool = Fal
         )
         if target.exists():
             os.rename(target, old)
-        try:
-            os.rename(new, target)
-        except OSError:
-            if old.exists():
-                os.rename(old, target)
-            raise
-        _keep_others(old, target)
+        os.rename(new, target)
     finally:
+        # Wherever Ctrl-C stops it, what was there is in its place before the rest is removed.
+        if old.exists() and not target.exists():
+            os.rename(old, target)
+        _keep_others(old, target)
         shutil.rmtree(workshop, ignore_errors=True)
 
 
