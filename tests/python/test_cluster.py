@@ -292,6 +292,20 @@ def test_a_part_that_a_worker_left_damaged_is_told_by_its_url(tmp_path: Path) ->
     batch.close()
 
 
+def test_a_store_that_is_named_by_a_path_is_the_drivers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A worker had written its parts below the folder that it stands in."""
+    (tmp_path / "worker").mkdir()
+    monkeypatch.chdir(tmp_path)
+    store = PartStore("parts")
+    monkeypatch.chdir(tmp_path / "worker")
+    PartStore(store.url).write(0, b"a part")
+    assert store.chunks() == {0} and store.read(0) == b"a part"
+    for url in ("memory://run", (tmp_path / "parts").as_uri()):
+        assert PartStore(url).url == url
+
+
 def test_a_part_on_a_cluster_has_as_many_rows_as_asked(tmp_path: Path) -> None:
     out = tmp_path / "rows"
     words = ["generate", "drop", "default", "-n", "5", "--chunk", "2", "--preset", "fast", "-q"]

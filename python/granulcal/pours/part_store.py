@@ -4,6 +4,7 @@ The parts are those of a batch's data set, on their way from a worker to the fol
 which alone keeps them: no second store of pours.
 """
 
+import os
 import uuid
 from typing import Any
 
@@ -26,7 +27,6 @@ class PartStore:
     def __init__(self, url: str) -> None:
         import fsspec  # pyright: ignore[reportMissingImports]
 
-        self.url = url
         allowed = "a folder's URL as fsspec takes it, as file:///shared/run or s3://bucket/run"
         if not url:
             raise ValueError(f"the store must be {allowed}, got an empty text")
@@ -36,6 +36,8 @@ class PartStore:
             raise ValueError(f"the store must be {allowed}, got {url!r}: {error}") from None
         except ImportError as error:
             raise ModuleNotFoundError(f"the store {url!r} needs another package: {error}") from None
+        # A worker need not stand where the driver does, from where a path is named.
+        self.url = url if ":" in url else os.path.abspath(url)
         self._files, self._root = found[0], found[1].rstrip("/")
 
     def chunks(self) -> set[int]:
