@@ -54,6 +54,12 @@ def test_features_approximate_the_kernel(kernel: str):
     assert np.sqrt(np.mean(error**2)) < 0.004
 
 
+def test_any_seed_that_is_taken_has_features() -> None:
+    """From 2^63 on, over the members of an ensemble from 2^61, it was "Overflow when unpacking"."""
+    most = draw_frequencies(8, 3, kernel="rbf", seed=5 * (2**64 - 1))
+    assert not np.array_equal(most, draw_frequencies(8, 3, kernel="rbf", seed=2**64 - 1))
+
+
 def test_training_density_is_the_mixture_density():
     layout = HeadLayout(components=4, dimension=3)
     outputs = torch.randn(5, layout.size, generator=torch.Generator().manual_seed(0)).double()

@@ -33,7 +33,8 @@ def draw_frequencies(count: int, dimension: int, *, kernel: str, seed: int) -> t
     """
     degrees = _MATERN_DEGREES_OF_FREEDOM.get(kernel)
     columns = dimension if degrees is None else dimension + 1
-    sobol = torch.quasirandom.SobolEngine(columns, scramble=True, seed=seed)
+    # Torch takes half of the seeds that we do.
+    sobol = torch.quasirandom.SobolEngine(columns, scramble=True, seed=seed % 2**63)
     points = sobol.draw(count, dtype=torch.float64).clamp(_EDGE, 1 - _EDGE)
     gaussian = torch.special.ndtri(points[:, :dimension])
     if degrees is None:
