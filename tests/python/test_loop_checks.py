@@ -118,6 +118,28 @@ def test_pairs_stretch_an_interval_that_is_too_short(linear: Linear, surrogate: 
     assert calibrate(surrogate, model, lambda *_: None, RULES, count=3) is None
 
 
+def test_pairs_have_the_errors_that_a_fit_allows_for(linear: Linear) -> None:
+    # A declared clock does what the effect does: pairs without one would all be held.
+    clock = Effect("clock", is_two_sided=True, nuisance_sd=0.1)
+    both = replace(linear, design=Design(("a",), ("height",), (*linear.design.effects, clock)))
+    generator = np.random.default_rng(0)
+    u, c, psi = generator.random(320), generator.random(320), np.zeros((320, 2))
+    psi[200:260, 0], psi[260:, 1] = generator.random(60), generator.uniform(-1, 1, 60)
+    x = np.concatenate(
+        [
+            both.pours(a, b, s + 0.9 * t, 1, generator, 0.1 * t)
+            for a, b, (s, t) in zip(u, c, psi, strict=True)
+        ]
+    )
+    surrogate = Surrogate.fit(both.design, u[:, None], c[:, None], psi, x, features=4)
+    found = trace(surrogate, both.observe(0.4, 0.6, 1), RULES)
+    model = found.model_of(found.best)
+    pairs = calibrate(
+        surrogate, model, lambda b, at, s: both.observe(float(at[0]), s, 100 + b), RULES, count=40
+    )
+    assert pairs is not None and 30 <= pairs.held < 40 and 1 < pairs.stretch < 2
+
+
 def test_pairs_are_for_a_single_named_effect(linear: Linear, surrogate: Surrogate) -> None:
     nothing = trace(surrogate, linear.observe(0.4, 0.0, 2), RULES)
     none: Any = None

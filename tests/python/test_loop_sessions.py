@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal.errors import ObservationError
 from granulcal.loop.analysis import Analysis
-from granulcal.loop.check.own_errors import as_recorded, in_told_sessions
+from granulcal.loop.check.own_errors import as_recorded, in_told_sessions, with_own_errors
 from granulcal.loop.condition import Condition
-from granulcal.loop.effects.design import Design, Effect
+from granulcal.loop.effects.design import Design, Effect, normal_from_cube
 from granulcal.loop.effects.library import by_name
 from granulcal.loop.effects.nuisances import declared_nuisances
 from granulcal.loop.pours.replicates import ModelPours
@@ -92,6 +92,29 @@ def test_one_value_holds_within_a_session(toy: Clocks, surrogate: Surrogate) -> 
             assert days[g, :, h] == pytest.approx(product if together else 0 * product)
     shared = LinearisedSurrogate.at(toy.surrogate(is_shared=True), at, counts, v)
     assert np.linalg.matrix_rank(shared.nuisance) == 1
+
+
+def test_drawn_errors_are_of_the_declared_size(toy: Clocks, surrogate: Surrogate) -> None:
+    days, places = ("monday", "", "monday"), (0.0, 0.5, 1.0)
+    seen = [
+        ConditionPours.of(f"{c:g}", [c], toy.at(c, 0.0, 1), day)
+        for c, day in zip(places, days, strict=True)
+    ]
+    at, numbers = np.array(places)[:, None], session_numbers(days)
+    v = normal_from_cube(THETA)
+    gaps = []
+    for i in range(400):
+        moved = with_own_errors(surrogate, v, seen, np.random.default_rng(i))
+        each = [
+            surrogate.standardise(one.pours) - surrogate.standardise(plain.pours)
+            for one, plain in zip(moved, seen, strict=True)
+        ]
+        # All pours of a condition have its clock.
+        np.testing.assert_allclose(each, np.tile([rows[:1] for rows in each], (1, 5, 1)), atol=1e-9)
+        gaps.append(np.concatenate([rows[0] for rows in each]))
+    found = np.array(gaps).T @ np.array(gaps) / len(gaps)
+    declared = LinearisedSurrogate.at(surrogate, at, np.full(3, 5.0), v, numbers).nuisance
+    assert np.abs(found - declared).max() < 0.2 * np.abs(declared).max()
 
 
 def test_two_clocks_of_one_day_are_a_finding(toy: Clocks, surrogate: Surrogate) -> None:

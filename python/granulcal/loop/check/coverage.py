@@ -1,8 +1,9 @@
 r"""How wide an interval of a strength has to be: simulated pairs of a truth and what is made of it.
 
 Around the fit of a named effect strengths $\psi_b$ are drawn evenly and parameters from the normal
-of the fit; each pair is poured as often as was measured, and fitted as the measured pours were. Of
-its posterior $L_b(\psi)$ the stretch
+of the fit; each pair is poured as often as was measured, moved by one draw of the declared
+nuisances (`own_errors.py`), and fitted as the measured pours were. Of its posterior $L_b(\psi)$ the
+stretch
 
 $$ \tau_b = \min \{ \tau \ge 1 : \psi_b \in I_\tau(L_b) \}, \qquad
    I_\tau(L) = \text{central interval of } L^{1 / \tau^2} $$
@@ -25,7 +26,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.effects.design import LARGEST_Z, cube_from_normal
+from granulcal.loop.check.own_errors import with_own_errors
+from granulcal.loop.effects.design import LARGEST_Z, cube_from_normal, normal_from_cube
 from granulcal.loop.surrogate.baseline import Fit, fit_base
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.stacked_means import StackedMeans
@@ -126,6 +128,8 @@ def calibrate(
         observed = pour(b, theta, psi)
         if observed is None:
             continue
+        own = np.random.default_rng([seed, b])
+        observed = with_own_errors(surrogate, normal_from_cube(theta), observed, own)
         stack = StackedMeans.of(surrogate, observed)
         local, base = fit_base(surrogate, stack, seed + b)
         found = fit_single(local, stack.means.ravel(), base, k, thresholds)

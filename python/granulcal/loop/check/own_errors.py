@@ -11,11 +11,15 @@ is by how much the statistics of c are off in the mean. A model's pours are move
 they are held against the measurement: how wrongly a clock was set is no error of the model, where
 another recording of the day has told it. Conditions of other sessions stay as they are.
 
+Simulated pairs (`coverage.py`) have errors drawn of the same covariance: pours alone have none, and
+a fit that allows for them would seem to hold the truth more often than it does of measured ones.
+
 Reference:
     Rasmussen and Williams, Gaussian processes for machine learning, 2006, equation 2.23.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +28,14 @@ from granulcal.loop.analysis import Analysis
 from granulcal.loop.check.recentre import gap_of
 from granulcal.loop.pours.replicates import FEWEST, ModelPours
 from granulcal.loop.surrogate.baseline import Fit
-from granulcal.loop.surrogate.condition_pours import session_numbers
+from granulcal.loop.surrogate.condition_pours import ConditionPours, session_numbers
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, Condition, Task
 from granulcal.loop.test.trace import Trace
 
-__all__ = ["as_recorded", "in_told_sessions"]
+__all__ = ["as_recorded", "in_told_sessions", "with_own_errors"]
 
 Array = NDArray[np.float64]
 
@@ -67,6 +72,33 @@ def as_recorded(
         moved.append(_moved(analysis, surrogate, found.fit_of(one), measured, rows, told))
     base, augmented = moved[0], moved[-1]
     return {name: ModelPours(base[name], augmented[name]) for name in simulated}
+
+
+def with_own_errors(
+    surrogate: Surrogate, v: Array, pours: Sequence[ConditionPours], generator: np.random.Generator
+) -> list[ConditionPours]:
+    """Returns pours of several conditions, moved as one draw of the declared nuisances does.
+
+    Args:
+        surrogate: whose nuisances these are.
+        v: z-scores of the parameters that the pours have, shape (p,).
+        pours: without such errors.
+        generator: of the draw; nothing is drawn without nuisances.
+    """
+    design = surrogate.design
+    if not design.nuisances:
+        return list(pours)
+    stack = StackedMeans.of(surrogate, pours)
+    local = LinearisedSurrogate.at(surrogate, stack.conditions, stack.counts, v, stack.sessions)
+    by = np.zeros_like(stack.means)
+    for k, along in zip(design.nuisances, local.own_errors, strict=True):
+        # A session has the number of its first condition.
+        drawn = generator.standard_normal(len(pours))
+        of = np.zeros_like(stack.sessions) if design.effects[k].is_shared else stack.sessions
+        by += drawn[of, None] * along
+    return [
+        replace(one, pours=surrogate.moved(one.pours, y)) for one, y in zip(pours, by, strict=True)
+    ]
 
 
 def _moved(
