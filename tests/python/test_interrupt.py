@@ -224,6 +224,18 @@ def test_finished_pours_of_an_interrupted_calibration_are_kept(
     assert len(again.rows) >= 3
 
 
+def test_pours_that_lack_a_statistic_are_kept(small_scene, small_prior, tmp_path: Path) -> None:
+    from granulcal.pours.kept_pours import KeptPours
+
+    path, theta = tmp_path / "pours.json", small_prior.sample(2, seed=1)
+    # What a pour does not show is no number, and no number of JSON.
+    look = ("radius", "late"), lambda _: [0.01, np.nan]
+    made = KeptPours(small_scene, small_prior, path, threads=1, look=look)(theta, 0)
+    again = KeptPours(small_scene, small_prior, path, threads=1, look=look)
+    assert again.kept_of(theta) == 2 and again.left_out(2).unseen == 2
+    assert np.array_equal(again(theta, 0), made, equal_nan=True)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_after_a_command_signals_do_what_they_did_before(number: signal.Signals) -> None:
     code = (
