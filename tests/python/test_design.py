@@ -14,7 +14,13 @@ from granulcal import _native
 from granulcal.design.pattern import Pattern, simulate_plan
 from granulcal.design.reach import Reach
 from granulcal.design.ring import STATISTICS
-from granulcal.design.ring_model import HEIGHT, RingModel, height_prior, observing_radii
+from granulcal.design.ring_model import (
+    HEIGHT,
+    RingModel,
+    _is_trained,
+    height_prior,
+    observing_radii,
+)
 from granulcal.errors import ExtrapolationError, TrainingDataError, UnreachableRingError
 from granulcal.pours.left_out import LeftOut
 
@@ -242,6 +248,17 @@ def test_a_pour_that_jams_is_told():
     pattern = Pattern(*grains, ("at_rest", "jammed"), np.zeros((2, 2)), gc.Scene.funnel())
     assert not pattern.is_whole
     assert [note.split(":")[0] for note in pattern.notes] == ["pour 2 jams"]
+
+
+def test_a_model_of_another_material_is_not_taken_for_ones_own(tmp_path):
+    scene = observing_radii(gc.Scene.funnel(count=60, preset="fast"))
+    prior = height_prior((0.08, 0.13))
+    other = scene.with_({"material.sliding_friction": 0.1})
+    one, two = (gc.generate(each, prior, 3, seed=2, progress=False) for each in (scene, other))
+    # Heights of one seed are the same.
+    assert np.array_equal(one.theta, two.theta)
+    one.save(tmp_path / "training.parquet")
+    assert _is_trained(tmp_path, one) and not _is_trained(tmp_path, two)
 
 
 def test_command_trains_plans_and_resumes(tmp_path):
