@@ -230,3 +230,15 @@ def test_the_interval_of_one_more_pour_holds_it_as_often_as_it_says(pours: int, 
     held = np.mean((low <= another) & (another <= high))
     # Quantiles of 20 pours had held 0.82 of 0.9.
     assert abs(held - level) < 0.012
+
+
+@pytest.mark.parametrize("pours", [2, 5, 10])
+@pytest.mark.parametrize("own", [0.0, 0.3, 3.0])
+def test_draws_of_few_pours_are_no_further_pours(pours: int, own: float) -> None:
+    random = np.random.default_rng(pours)
+    rows = np.repeat(random.standard_normal((pours, 20_000)), 40, axis=0)
+    low, high = of_one_more(rows + own * random.standard_normal(rows.shape), 0.9, pours)
+    another = random.standard_normal(20_000) + own * random.standard_normal(20_000)
+    held = np.mean((low <= another) & (another <= high))
+    # As if all were of pours it had been 0.87 to 1.
+    assert 0.89 < held < 0.95
