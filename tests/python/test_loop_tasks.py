@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import granulcal as gc
-from granulcal.errors import TrainingDataError
+from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.effects.library import by_name
 from granulcal.loop.pours.archive import Archive, ArchivePlan, require_same
 from granulcal.loop.task import Task
@@ -19,9 +19,9 @@ high = 0.6
 """
 
 
-def load(folder: Path, head: str, first: str, second: str) -> Task:
+def load(folder: Path, head: str, first: str, second: str, scene: gc.Scene | None = None) -> Task:
     """A task of a falling ball of grains; `first` and `second` is what two conditions state."""
-    (folder / "scene.toml").write_text(gc.Scene.drop(0.1, count=100).to_toml())
+    (folder / "scene.toml").write_text((scene or gc.Scene.drop(0.1, count=100)).to_toml())
     (folder / "prior.toml").write_text(PRIOR)
     text = f'scene = "scene.toml"\nprior = "prior.toml"\n{head}\n'
     for name, at in (("low", first), ("high", second)):
@@ -42,6 +42,25 @@ def test_what_the_conditions_state_is_left_out_of_the_effects_that_nobody_names(
     others = load(tmp_path, "", LOW, HIGH).library
     missing = [effect.name for effect in others if effect not in found]
     assert missing == ["tilt.x", "count"]
+
+
+def test_a_height_is_asked_where_pours_lie_beside_the_conditions(tmp_path: Path) -> None:
+    # No pour tells otherwise what a wrong height does, and it would count as tried.
+    funnel = gc.Scene.funnel(count=100)
+    low, high = '"funnel.height" = 0.05', '"funnel.height" = 0.1'
+
+    def asked(head: str, second: str) -> bool:
+        names = [effect.name for effect in load(tmp_path, head, low, second, funnel).library]
+        return "height" in names
+
+    assert asked("", high) and asked('effects = ["height"]', high)
+    assert not asked("", low) and not asked("between = false", high)
+    for head, second, why in (
+        ('effects = ["height"]', low, "all conditions state the same: leave it out of effects"),
+        ('effects = ["height"]\nbetween = false', high, "between = false has none: leave it out"),
+    ):
+        with pytest.raises(ObservationError, match=f"effect height needs pours at .*, and {why}"):
+            asked(head, second)
 
 
 def test_the_usual_effects_and_more_are_asked_in_the_order_of_the_library(tmp_path: Path) -> None:

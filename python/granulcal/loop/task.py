@@ -44,6 +44,7 @@ condition may then depend on each other (two walls that turn together). With
 all pours are where the fits are.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -233,7 +234,8 @@ class Task:
         )
         definitions = tuple(Definition.of(table) for table in document.get("definitions", []))
         named = document.get("effects", [])
-        library = _chosen(named, scene, conditions[0].at, file)
+        between = document.get("between", True)
+        library = _chosen(named, scene, [one.at for one in conditions], between, file)
         ats = [one.at for one in _by_each(conditions, definitions)]
         declared = declared_nuisances(document.get("nuisances", {}), scene, ats)
         names = {effect.name for effect in declared}
@@ -258,7 +260,7 @@ class Task:
             tolerances=Tolerances.load(folder / document["tolerances"])
             if "tolerances" in document
             else None,
-            between=document.get("between", True),
+            between=between,
             sealed_in_archive=document.get("sealed_in_archive", True),
             definitions=definitions,
         )
@@ -425,13 +427,21 @@ def _by_each(
     return tuple(c.under(one) for one in definitions for c in conditions) or conditions
 
 
-def _default(scene: Scene, at: dict[str, float]) -> tuple[LibraryEffect, ...]:
+def _default(
+    scene: Scene, ats: Sequence[dict[str, float]], between: bool
+) -> tuple[LibraryEffect, ...]:
     """The library where a task names no effects: without those that its scene cannot show.
 
-    Nor those on a number that its conditions, the first of which states `at`, do not have, or those
-    that are a number which they state: what is known can be no finding.
+    Nor those that are a number which its conditions, `ats`, state: what is known can be no finding;
+    nor those on a condition's number where no pour lies beside the conditions.
     """
-    library = tuple(effect for effect in FUNNEL if effect.shift == (effect.path in at))
+    stated = ats[0]
+    beside = [path for path in stated if between and len({at.get(path) for at in ats}) > 1]
+    library = tuple(
+        effect
+        for effect in FUNNEL
+        if (effect.path in beside if effect.shift else effect.path not in stated)
+    )
     if not _has_image(scene):
         return tuple(effect for effect in library if not effect.image)
     if not is_above_axis(scene):
@@ -441,10 +451,14 @@ def _default(scene: Scene, at: dict[str, float]) -> tuple[LibraryEffect, ...]:
 
 
 def _chosen(
-    named: list[str], scene: Scene, at: dict[str, float], file: Path
+    named: list[str],
+    scene: Scene,
+    ats: Sequence[dict[str, float]],
+    between: bool,
+    file: Path,
 ) -> tuple[LibraryEffect, ...]:
     """The effects that a task's file names, `USUAL` being all that are tried where none is."""
-    usual = _default(scene, at) if USUAL in named or not named else ()
+    usual = _default(scene, ats, between) if USUAL in named or not named else ()
     others = _named([name for name in named if name != USUAL], file)
     added = tuple(effect for effect in others if effect not in usual)
     return (*usual, *added)

@@ -142,22 +142,25 @@ def refuse_stated(library: Iterable[LibraryEffect], ats: Sequence[Mapping[str, f
 
 
 def refuse_unread(library: Iterable[LibraryEffect], inputs: Sequence[Input], between: bool) -> None:
-    """Refuses a tolerance of a condition's own number where no pour lies beside the conditions.
+    """Refuses effects on a condition's own number where no pour lies beside the conditions.
 
     Raises:
-        ObservationError: the tolerance, and why.
+        ObservationError: the effect or the tolerance, and why.
     """
     for effect in library:
-        if not effect.shift or effect.nuisance_sd is None:
+        if not effect.shift:
             continue
         ends = [(low, high) for path, low, high in inputs if path == effect.path]
-        if not between or not ends:
-            why = "between = false has none" if not between else "all conditions state the same"
-            raise ObservationError(
-                f"nuisance {effect.name} needs pours at further values of {effect.path}, and {why}"
-                ": leave it out of nuisances"
-                + ("" if not between else f', or declare it by its path, "{effect.path}"')
-            )
+        if between and ends:
+            continue
+        why = "between = false has none" if not between else "all conditions state the same"
+        is_declared = effect.nuisance_sd is not None
+        raise ObservationError(
+            f"{'nuisance' if is_declared else 'effect'} {effect.name} needs pours at further "
+            f"values of {effect.path}, and {why}: leave it out of "
+            + ("nuisances" if is_declared else "effects")
+            + (f', or declare it by its path, "{effect.path}"' * (between and is_declared))
+        )
 
 
 def refuse_unpourable(
