@@ -289,6 +289,9 @@ def test_scenes_without_an_image_refuse_by_name(tmp_path: Path) -> None:
     prior = gc.Prior.from_toml(PRIOR)
     with pytest.raises(ObservationError, match="camera.offset: effects of the image"):
         Task(observing, prior, conditions, by_name(["tilt.x", "camera.offset"]))
+    # A tolerance of lengths would forgive nothing there; `length.scale` is that of a series.
+    with pytest.raises(ObservationError, match="camera.scale: effects of the image"):
+        Task(observing, prior, conditions, by_name(["tilt.x", "camera.scale"]))
     # A task that names none has those that its scene can show.
     for name, text, expected in (
         ("image", scene().to_toml(), NAMES),

@@ -180,6 +180,9 @@ class Task:
                 "conditions lie at the sealed ones, too"
             )
         require_image(self.scene, (effect.name for effect in self.library if effect.image))
+        if self.scene.observed_names:
+            # Of what is observed nobody knows the power of a length, and no pour would be read so.
+            require_image(self.scene, (effect.name for effect in self.library if effect.camera))
         require_series(self.scene, ((e.name, e.series) for e in self.library if e.series))
         self._refuse_fitted()
         self._refuse_unlike()
