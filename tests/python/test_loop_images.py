@@ -289,9 +289,6 @@ def test_scenes_without_an_image_refuse_by_name(tmp_path: Path) -> None:
     prior = gc.Prior.from_toml(PRIOR)
     with pytest.raises(ObservationError, match="camera.offset: effects of the image"):
         Task(observing, prior, conditions, by_name(["tilt.x", "camera.offset"]))
-    # A tolerance of lengths would forgive nothing there; `length.scale` is that of a series.
-    with pytest.raises(ObservationError, match="camera.scale: effects of the image"):
-        Task(observing, prior, conditions, by_name(["tilt.x", "camera.scale"]))
     # A task that names none has those that its scene can show.
     for name, text, expected in (
         ("image", scene().to_toml(), NAMES),
@@ -307,6 +304,12 @@ def test_scenes_without_an_image_refuse_by_name(tmp_path: Path) -> None:
         )
         library = Task.load(tmp_path / f"{name}.toml").library
         assert [effect.name for effect in library if effect.image] == expected
+    # A tolerance of lengths would forgive nothing of what is observed; `length.scale` does.
+    text = (tmp_path / "observing.toml").read_text()
+    for head in ('effects = ["tilt.x", "camera.scale"]', 'nuisances = { "camera.scale" = 0.005 }'):
+        (tmp_path / "named.toml").write_text(f"{head}\n{text}")
+        with pytest.raises(ObservationError, match="camera.scale: effects of the image"):
+            Task.load(tmp_path / "named.toml")
 
 
 def test_a_camera_beside_the_axis_moves_what_it_sees_and_nothing_else(pour: gc.Pour) -> None:

@@ -79,7 +79,7 @@ from granulcal.loop.effects.askable import (
 from granulcal.loop.effects.definitions import Definition, check_definitions, definition_inputs
 from granulcal.loop.effects.image_faults import require_image
 from granulcal.loop.effects.law import law_numbers
-from granulcal.loop.effects.library import FUNNEL, LibraryEffect, by_name
+from granulcal.loop.effects.library import FUNNEL, LIBRARY, LibraryEffect, by_name
 from granulcal.loop.effects.nuisances import declared_nuisances
 from granulcal.loop.effects.resolution import Resolution
 from granulcal.loop.effects.series_faults import require_series
@@ -180,9 +180,6 @@ class Task:
                 "conditions lie at the sealed ones, too"
             )
         require_image(self.scene, (effect.name for effect in self.library if effect.image))
-        if self.scene.observed_names:
-            # Of what is observed nobody knows the power of a length, and no pour would be read so.
-            require_image(self.scene, (effect.name for effect in self.library if effect.camera))
         require_series(self.scene, ((e.name, e.series) for e in self.library if e.series))
         self._refuse_fitted()
         self._refuse_unlike()
@@ -242,6 +239,10 @@ class Task:
         ats = [one.at for one in _by_each(conditions, definitions)]
         declared = declared_nuisances(document.get("nuisances", {}), scene, ats)
         names = {effect.name for effect in declared}
+        if scene.observed_names:
+            # What is observed has no power of a length: such a tolerance would forgive nothing.
+            told = {*names, *named}
+            require_image(scene, (e.name for e in LIBRARY if e.camera and e.name in told))
         candidates = tuple(effect for effect in library if effect.name not in names)
         refuse_both(candidates, declared, named)
         library = (*candidates, *declared)
