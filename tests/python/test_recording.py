@@ -1,5 +1,6 @@
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -339,6 +340,12 @@ def test_distances_are_in_training_deviations(small_data):
     assert [row.name for row in rows] == list(small_data.x_names)
     assert all(row.difference == pytest.approx(2.0) for row in rows)
     assert comparison_table(a, [a - 3 * scale.sd], scale)[0].is_far
+
+
+def test_the_nearest_pour_is_told_by_what_varies():
+    x = np.column_stack([np.random.default_rng(0).random((30, 3)), np.full(30, 7.0)])
+    data = cast(Any, SimpleNamespace(x=x, is_usable=np.ones(30, bool)))
+    assert nearest_row([*x[12, :3], 7.5], data) == 12
 
 
 def test_a_statistic_that_never_varied_counts_only_where_it_differs():

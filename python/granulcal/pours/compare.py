@@ -58,7 +58,9 @@ def nearest_row(observed: ArrayLike, data: Dataset) -> int:
     """Returns the index of the usable pour of `data` that is nearest to `observed` (s,)."""
     usable = np.flatnonzero(data.is_usable)
     scaled = Scale.of(data).difference(data.x[usable], unmasked("observed", observed))
-    return int(usable[np.linalg.norm(scaled, axis=1).argmin()])
+    # By a statistic that never varied all are as far.
+    told = scaled[:, np.isfinite(scaled).all(axis=0)]
+    return int(usable[np.linalg.norm(told, axis=1).argmin()])
 
 
 @dataclass(frozen=True, kw_only=True)
