@@ -310,6 +310,11 @@ def test_what_a_task_file_lacks_is_named(tilted: Path, tmp_path: Path) -> None:
     (tilted.parent / "off.json").write_text(json.dumps(tolerances))
     with pytest.raises(ObservationError, match=r"tolerances .* got 'funnel.slope'"):
         load('tolerances = "off.json"\n' + text)
+    # Between places that fall nothing can be told.
+    falling = {**tolerances, "path": "start.base", "at": [0.06, 0.02]}
+    (tilted.parent / "off.json").write_text(json.dumps(falling))
+    with pytest.raises(ObservationError, match=r"off.json: at must rise, got \[0.06, 0.02\]"):
+        load('tolerances = "off.json"\n' + text)
     with pytest.raises(TrainingDataError, match="no effect magnetism.*; there are cohesion"):
         load(text.replace("tilt.y", "magnetism"))
     # Before anything is registered or poured.

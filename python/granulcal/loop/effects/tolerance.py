@@ -58,7 +58,7 @@ class Tolerances:
 
         Raises:
             FileNotFoundError: there is no such file.
-            ObservationError: shapes that do not agree.
+            ObservationError: shapes that do not agree, or places that do not rise.
         """
         try:
             document = read_json(path, _SCHEMA)
@@ -74,6 +74,8 @@ class Tolerances:
                 f"{path}: directions must have shape (D, {len(at)}, {len(names)}), "
                 f"got {directions.shape}"
             )
+        if not (np.diff(at) > 0).all():
+            raise ObservationError(f"{path}: at must rise, got {at.tolist()}")
         return cls(names, str(document["path"]), at, directions)
 
     def fingerprint(self) -> str:
