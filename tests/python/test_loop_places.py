@@ -2,6 +2,7 @@
 
 import re
 import struct
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -25,6 +26,7 @@ from granulcal.loop.close import Closed, _candidates, planned
 from granulcal.loop.effects.design import Design, Effect, normal_from_cube
 from granulcal.loop.effects.library import LibraryEffect, by_name
 from granulcal.loop.pours.archive import Archive, ArchivePlan
+from granulcal.loop.pours.parts import parts_of
 from granulcal.loop.surrogate.baseline import Fit
 from granulcal.loop.surrogate.fit_draws import draw
 from granulcal.loop.task import FIT, SEALED, Condition, Task
@@ -128,6 +130,18 @@ def test_an_archive_may_leave_sealed_conditions_out(tmp_path: Path) -> None:
     assert planned(asked(False), 400, 0).unit(HIGH) == pytest.approx([1.0])
     with pytest.raises(ObservationError, match="needs between = false"):
         asked(True)
+
+
+def test_no_two_parts_share_their_seeds() -> None:
+    # Steps of effects and of places met at eleven places: two pours would have passed for one.
+    plan = planned(task(False, averaged=True, effects=("count", "tilt.x")), 900, 3)
+    many = replace(plan, places=tuple({"start.height": 0.02 + 1e-3 * i} for i in range(31)))
+    seeds = [part.seed for part in parts_of(many)]
+    assert len(set(seeds)) == len(seeds) == 31 * (1 + 4 + 1)
+    # Of a longer library the shorter one's parts keep theirs.
+    longer = replace(many, library=(*many.library, *by_name(["drag"])))
+    own = {part.name: part.seed for part in parts_of(longer)}
+    assert [own[part.name] for part in parts_of(many)] == seeds
 
 
 def test_an_archive_at_the_conditions_alone(tmp_path: Path) -> None:

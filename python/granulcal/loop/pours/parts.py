@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 # Strengths at which an effect of a whole number is tried.
 _WHOLE_STRENGTHS = (0.25, 0.5, 0.75, 1.0)
 # Seeds of the parts, so that no two share a pour.
-_SEED_STEP, _PLACE_STEP = 1009, 101
+_SEED_STEP, _PLACE_STEP, _FREE_STEP = 1009, 101, 10_000_019
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,15 @@ def parts_of(plan: ArchivePlan) -> list[Part]:
     for number, effect in enumerate(plan.library, start=1):
         if not effect.is_free:
             parts += _of_effect(plan, effect, common, plan.seed + _SEED_STEP * number)
-    return [piece for part in parts for piece in part.at(plan.places)]
+    found, seeds = [], set()
+    for piece in (piece for part in parts for piece in part.at(plan.places)):
+        seed = piece.seed
+        # From eleven places on the steps meet; parts of a shorter library keep their seeds.
+        while seed in seeds:
+            seed += _FREE_STEP
+        seeds.add(seed)
+        found.append(replace(piece, seed=seed))
+    return found
 
 
 def _of_effect(
