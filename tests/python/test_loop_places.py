@@ -26,6 +26,7 @@ from granulcal.loop.close import Closed, _candidates, planned
 from granulcal.loop.effects.design import Design, Effect, normal_from_cube
 from granulcal.loop.effects.library import LibraryEffect, by_name
 from granulcal.loop.pours.archive import Archive, ArchivePlan
+from granulcal.loop.pours.cube import cube, from_cube
 from granulcal.loop.pours.parts import parts_of
 from granulcal.loop.surrogate.baseline import Fit
 from granulcal.loop.surrogate.fit_draws import draw
@@ -341,6 +342,22 @@ def test_columns_of_all_gravities_are_one_in_units_of_free_fall(tmp_path: Path) 
     ]
     [kind] = loop_liquid.poured(tmp_path)
     assert planned(asked, kind.count, 0, rounds=1, rules=Thresholds()).pours < kind.count
+
+
+@pytest.mark.parametrize("ends", [{}, {"low": 0.4}, {"high": 0.55}, {"low": 0.4, "high": 0.6}])
+def test_coordinates_of_a_prior_are_shares_of_it(ends: dict[str, float]) -> None:
+    # A model is poured at the parameters of its coordinates: those that pours of it would have.
+    friction = gc.Parameter(
+        path="material.sliding_friction", distribution="normal", mean=0.5, sd=0.2, **ends
+    )
+    rolling = gc.Parameter(
+        path="material.rolling_friction", distribution="log_uniform", low=0.01, high=1.0
+    )
+    prior = gc.Prior([friction, rolling])
+    theta = prior.sample(2000, seed=1)
+    u = cube(prior, theta)
+    np.testing.assert_allclose(from_cube(prior, u), theta, rtol=1e-9)
+    assert np.abs(np.sort(u, axis=0) - (np.arange(2000) + 0.5)[:, None] / 2000).max() < 0.04
 
 
 def test_draws_around_a_fit_have_its_spread_and_stay_in_the_prior() -> None:

@@ -16,7 +16,10 @@ def cube(prior: Prior, theta: Array) -> Array:
     coordinates = prior.to_unconstrained(theta)
     for i, parameter in enumerate(prior.free):
         if parameter.distribution == "normal":
-            coordinates[:, i] = cube_from_normal(coordinates[:, i])
+            # Of a normal that is cut to bounds the share between them.
+            first, last = cube_from_normal(np.array(parameter.coordinate_bounds))
+            shares = cube_from_normal(coordinates[:, i])
+            coordinates[:, i] = np.clip((shares - first) / (last - first), 0.0, 1.0)
     return coordinates
 
 
