@@ -1,5 +1,6 @@
 """What a task cannot be asked about is refused by name, before anything is poured."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -114,6 +115,17 @@ LOW, HIGH = '"start.height" = 0.03', '"start.height" = 0.1'
 def test_what_a_task_cannot_ask_is_named(head: str, also: str, told: str, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=told):
         load(tmp_path, head, LOW + also, HIGH + also)
+
+
+def test_what_the_prior_fixes_is_no_effect(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Every pour has the fixed number, those of the effect as well.
+    fixed = '[[parameter]]\npath = "grains.count"\ndistribution = "fixed"\nvalue = 100\n'
+    monkeypatch.setattr(sys.modules[__name__], "PRIOR", PRIOR + fixed)
+    for head in ('effects = ["count"]', 'effects = ["drag"]\nnuisances = { "count" = 5 }'):
+        with pytest.raises(ObservationError, match="count sets grains.count, which the prior"):
+            load(tmp_path, head, LOW, HIGH)
+    found = load(tmp_path, "", LOW, HIGH)
+    assert "count" not in [effect.name for effect in (*found.library, *found.untried)]
 
 
 def test_whole_numbers_are_not_drawn_between(tmp_path: Path) -> None:

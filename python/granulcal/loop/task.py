@@ -235,7 +235,10 @@ class Task:
         definitions = tuple(Definition.of(table) for table in document.get("definitions", []))
         named = document.get("effects", [])
         between = document.get("between", True)
-        library = _chosen(named, scene, [one.at for one in conditions], between, file)
+        known = Prior.load(folder / document["prior"])
+        # What the prior fixes is known, as what the conditions state.
+        stated = [known.fixed | one.at for one in conditions]
+        library = _chosen(named, scene, stated, between, file)
         ats = [one.at for one in _by_each(conditions, definitions)]
         declared = declared_nuisances(document.get("nuisances", {}), scene, ats)
         names = {effect.name for effect in declared}
@@ -249,7 +252,6 @@ class Task:
         if "resolution" in document:
             library = (*library, Resolution.of(document["resolution"]).effect(scene))
         library = _with_alike(library, scene)
-        known = Prior.load(folder / document["prior"])
         unknown = (
             Prior.from_tables(document["nuisance"]).parameters if "nuisance" in document else ()
         )
@@ -307,12 +309,19 @@ class Task:
         refuse_unpourable(self.scene, self.prior, self.library, ats)
 
     def _refuse_fitted(self) -> None:
-        """Refuses candidates whose number every fit has free.
+        """Refuses effects whose number every fit has free, or the prior has fixed in every pour.
 
         Raises:
             ObservationError: the effect and the number.
         """
         for effect in self.library:
+            fixed = [] if effect.is_free else [effect.path, *dict(effect.also)]
+            for path in fixed:
+                if path in self.prior.fixed:
+                    raise ObservationError(
+                        f"{effect.name} sets {path}, which the prior fixes in every pour: say it "
+                        f"in the scene and leave it out of prior, or leave {effect.name} out"
+                    )
             if effect.path in self.prior.names and not effect.is_free and effect.held is None:
                 raise ObservationError(
                     f"{effect.name} is the number {effect.path}, which the prior has free in every "
@@ -376,7 +385,8 @@ class Task:
     @property
     def untried(self) -> tuple[LibraryEffect, ...]:
         """The library's effects of the world that the scene takes and that are not tried."""
-        return untried(self.scene, self.library, (*self.paths, *self.prior.names))
+        known = (*self.paths, *self.prior.names, *self.prior.fixed)
+        return untried(self.scene, self.library, known)
 
     @property
     def _by_each_definition(self) -> tuple[Condition, ...]:
