@@ -315,6 +315,10 @@ def test_what_a_task_file_lacks_is_named(tilted: Path, tmp_path: Path) -> None:
     (tilted.parent / "off.json").write_text(json.dumps(falling))
     with pytest.raises(ObservationError, match=r"off.json: at must rise, got \[0.06, 0.02\]"):
         load('tolerances = "off.json"\n' + text)
+    misspelt = {**falling, "at": [0.02, 0.06], "names": ["max_zz"]}
+    (tilted.parent / "off.json").write_text(json.dumps(misspelt))
+    with pytest.raises(ObservationError, match="no statistic 'max_zz'.*max_z"):
+        load('tolerances = "off.json"\n' + text)
     with pytest.raises(TrainingDataError, match="no effect magnetism.*; there are cohesion"):
         load(text.replace("tilt.y", "magnetism"))
     # Before anything is registered or poured.

@@ -62,6 +62,7 @@ from granulcal.documents import (
     Table,
     Text,
     check,
+    meant,
     parse_toml,
     read_bytes,
 )
@@ -89,6 +90,7 @@ from granulcal.loop.pours.forward import Coarse
 from granulcal.loop.pours.measures import is_above_axis
 from granulcal.loop.recorded import doubts_of, require_no_copies
 from granulcal.pours.scene import Scene
+from granulcal.pours.statistics import DIAGNOSTIC_NAMES, NAMES
 from granulcal.prior import Prior
 
 __all__ = ["FIT", "SEALED", "USUAL", "Condition", "Task"]
@@ -213,6 +215,7 @@ class Task:
                 "tolerances must be over a number that differs between conditions, "
                 f"{known or 'none'}; got {self.tolerances.path!r}"
             )
+        self._refuse_unknown_statistics()
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> "Task":
@@ -274,6 +277,18 @@ class Task:
     def under(self, definition: Definition, use: str) -> tuple[Condition, ...]:
         """Returns the conditions of one use, by a definition."""
         return tuple(c.under(definition) for c in self.stated if c.use == use)
+
+    def _refuse_unknown_statistics(self) -> None:
+        """Refuses tolerances of what no scene has: they would forgive nothing.
+
+        Raises:
+            ObservationError: the names.
+        """
+        names = (*self.scene.observed_names, *NAMES, *DIAGNOSTIC_NAMES)
+        given = () if self.tolerances is None else self.tolerances.names
+        unknown = [f"{name!r}{meant(name, names)}" for name in given if name not in names]
+        if unknown:
+            raise ObservationError(f"tolerances are of no statistic {', '.join(unknown)}")
 
     def _refuse_idle_sessions(self) -> None:
         """Refuses sessions where nothing is each condition's own: they would say nothing."""
