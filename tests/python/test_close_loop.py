@@ -3,6 +3,7 @@
 import hashlib
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -247,6 +248,18 @@ def test_further_pours_are_where_the_fits_are(tilted: Path, tmp_path: Path) -> N
     assert lean > 4 * base.x[:, where].std() / len(base.x) ** 0.5
     again = further(analysis, found, 0)
     assert forward.ran == 48 and np.array_equal(again[1].x, tilts.x)
+
+
+def test_recordings_are_read_with_what_the_prior_fixes(tilted: Path) -> None:
+    # As the pours are, which all have it.
+    task, fixed = Task.load(tilted), {"grains.diameter": 3e-3}
+    diameter = gc.Parameter(path="grains.diameter", distribution="fixed", value=3e-3)
+    other = replace(task, prior=gc.Prior([*task.prior.parameters, diameter]))
+    nothing: Any = None
+    found = Analysis(other, nothing, nothing, Thresholds(), 0, print).measured()["low"]
+    (low, *_) = task.conditions
+    assert np.array_equal(found, low.statistics(task.scene.with_(fixed)))
+    assert not np.array_equal(found, low.statistics(task.scene))
 
 
 def test_a_random_draw_is_poured_anew_under_each_condition(tilted: Path) -> None:

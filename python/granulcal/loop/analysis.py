@@ -44,7 +44,7 @@ class Analysis:
 
     def measured(self) -> dict[str, Array]:
         """Returns the statistics of the recordings of every condition to fit, by its name."""
-        return {c.name: c.statistics(self.task.scene) for c in self.fitted}
+        return {c.name: c.statistics(self.task.read_scene) for c in self.fitted}
 
     def pours(self, condition: Condition, rows: ArrayLike) -> ConditionPours:
         """Returns rows of statistics (n, s) as pours of a condition."""

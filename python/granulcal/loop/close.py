@@ -186,7 +186,7 @@ def close_loop(
     recorded = as_recorded(analysis, surrogate, found, measured, simulated)
     fit = error_of(task, analysis.fitted, measured, recorded, surrogate, seed)
     # Opened here, once, after everything that could be chosen has been.
-    measured |= {c.name: c.statistics(task.scene) for c in hidden}
+    measured |= {c.name: c.statistics(task.read_scene) for c in hidden}
     sealed = error_of(task, hidden, measured, recorded, surrogate, seed) if hidden else None
     standing = stand(
         found.verdict,

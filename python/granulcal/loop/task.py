@@ -423,6 +423,11 @@ class Task:
         held = next((effect for effect in self.library if effect.held is not None), None)
         return None if held is None else Coarse(dict(held.also), held.held or 0.0)
 
+    @property
+    def read_scene(self) -> Scene:
+        """The scene by which recordings are read: with what the prior fixes in every pour."""
+        return self.scene.with_(self.prior.fixed) if self.prior.fixed else self.scene
+
     def effect(self, name: str) -> LibraryEffect:
         """Returns an effect of the library with the scene's own numbers put in."""
         return next(e for e in self.library if e.name == name).at(self.at_first())
@@ -436,7 +441,7 @@ class Task:
             FileNotFoundError: a file that a condition names is not there.
             ObservationError: a recording that cannot be one of the scene, or a copy of another.
         """
-        rows = [condition.statistics(self.scene) for condition in self.conditions]
+        rows = [condition.statistics(self.read_scene) for condition in self.conditions]
         # The few numbers that a scene observes may be the same of two pours.
         is_image = not self.scene.observed_names
         require_no_copies(self.conditions, rows if is_image else [row[:0] for row in rows])

@@ -106,7 +106,7 @@ def moved(analysis: Analysis, surrogate: Surrogate) -> tuple[Moved, ...]:
     found, task = [], analysis.task
     for definition in task.definitions[1:]:
         observed = [
-            analysis.pours(c, c.statistics(task.scene)) for c in task.under(definition, FIT)
+            analysis.pours(c, c.statistics(task.read_scene)) for c in task.under(definition, FIT)
         ]
         there = trace(surrogate, observed, analysis.rules, seed=analysis.seed)
         found.append(Moved(definition.name, there.verdict))
