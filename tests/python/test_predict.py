@@ -129,6 +129,22 @@ def test_pours_are_as_many_as_an_interval_needs(
         models.predict("base", {"start.height": 0.02}, Forward(tmp_path, 1), pours=1)
 
 
+@pytest.mark.parametrize("model", ["base", "named"])
+def test_pours_that_cannot_be_used_are_told(model: str, models: Models, tmp_path: Path) -> None:
+    class Jams(Forward):
+        """Every second pour gives nothing."""
+
+        def limit(self, scene, seeds, faults=None, coarse=None):
+            rows = super().limit(scene, seeds, faults, coarse)
+            return rows[[i for i, seed in enumerate(seeds) if seed % 2 == 0]]
+
+    at, usual = {"start.height": 0.02}, Forward(tmp_path, 1)
+    found = models.predict(model, at, Jams(tmp_path, 1), level=0.3, pours=6)
+    assert found.pours == 3
+    assert "3 of 6 pours under this condition jam" in found.doubts[0]
+    assert not models.predict(model, at, usual, level=0.3, pours=6).doubts
+
+
 def test_a_folder_may_be_named_by_a_word(models: Models, tmp_path: Path) -> None:
     assert Models.load(str(tmp_path)).names == models.names
     with pytest.raises(FileNotFoundError, match="is nowhere the -o of close-loop"):
@@ -234,6 +250,38 @@ def test_a_posterior_predicts_by_pours_at_its_draws(
     ]
     found = told[0]["statistics"]["mean_r"]
     assert found["middle"] == pytest.approx(np.mean(rows)) and found["low"] < min(rows)
+
+
+def test_a_posterior_says_how_many_pours_jam(
+    inferred: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene, file = inferred / "scene.toml", inferred / "funnel.toml"
+    few = {"grains.count": 60, "funnel.height": 0.05}
+    file.write_text(gc.Scene.funnel().with_(few, preset="fast").to_toml())
+    words = ["--pours", "8", "--threads", "1", "--level", "0.3", "--json"]
+    # Three grains wide: of some materials they bridge it.
+    narrow = ["--at", "funnel.stem_radius=0.006", *words]
+    assert main(["predict", str(inferred), str(file), *narrow]) == 0
+    told = json.loads(capsys.readouterr().out)
+    lost = 8 - told["pours"]
+    assert 0 < lost < 8
+    assert f"{lost} of 8 pours under this condition jam" in told["warnings"][0]
+    # Where all can be used there is nothing to tell.
+    assert main(["predict", str(inferred), str(scene), "--at", "start.height=0.03", *words]) == 0
+    assert json.loads(capsys.readouterr().out)["warnings"] == []
+
+
+def test_a_funnel_above_the_camera_is_told(
+    inferred: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = inferred / "funnel.toml"
+    few = {"grains.count": 30, "end.horizon": 0.5}
+    file.write_text(gc.Scene.funnel().with_(few, preset="fast").to_toml())
+    words = ["--pours", "2", "--threads", "1", "--level", "0.3"]
+    for height, is_told in (("0.05", False), ("0.3", True)):
+        main(["predict", str(inferred), str(file), "--at", f"funnel.height={height}", *words])
+        asked = "(camera.height = 0.29 m): is it in metres?" in capsys.readouterr().err
+        assert asked is is_told, height
 
 
 def test_another_engine_than_the_material_was_inferred_with_is_told(

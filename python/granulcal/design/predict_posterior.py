@@ -12,6 +12,7 @@ from granulcal.design.posterior_file import PosteriorDraws
 from granulcal.errors import ObservationError
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
+from granulcal.loop.recorded import doubt_of_funnel
 from granulcal.loop.report.prediction import FEWEST, Prediction, require_level
 from granulcal.pours.scene import Scene
 
@@ -53,8 +54,10 @@ def predict_posterior(
         forward = Forward(Path(folder), threads or os.cpu_count() or 1)
         forward.fill("pours", asked)
         rows = np.concatenate([forward.pours(*one) for one in asked])
-    found = Prediction.of_pours("posterior", Measures.of(scenes[0]).names, rows, level)
-    return replace(found, doubts=(*_asked_for(posterior, at), *found.doubts))
+    names = Measures.of(scenes[0]).names
+    found = Prediction.of_pours("posterior", names, rows, level, asked=pours)
+    of_condition = (*_asked_for(posterior, at), *doubt_of_funnel("the condition", scenes[0]))
+    return replace(found, doubts=(*of_condition, *found.doubts))
 
 
 def poured_scenes(

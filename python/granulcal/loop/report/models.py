@@ -268,7 +268,8 @@ class Models:
             self._pours(makers[1 + i % (len(makers) - 1)], at, [_SEED + i], forward)
             for i in steps("pours", range(pours))
         ]
-        return self._of_rows(model, np.concatenate(rows), level)
+        whole = np.concatenate(rows)
+        return Prediction.of_pours(model, self.names, whole, level, asked=pours)
 
     def require_engine(self, model: str) -> None:
         """Refuses a model that pours where another engine is in use than that of the loop.
@@ -392,11 +393,6 @@ class Models:
     ) -> Array:
         return forward.limit(self._scene(maker, at), seeds, maker.faults, self.coarse)
 
-    def _of_rows(
-        self, model: str, rows: Array, level: float, pours: int | None = None
-    ) -> Prediction:
-        return Prediction.of_pours(model, self.names, rows, level, pours)
-
     def _corrected(
         self, at: Mapping[str, float], forward: Forward, level: float, pours: int
     ) -> Prediction:
@@ -412,7 +408,7 @@ class Models:
         for j, (column, transform) in enumerate(zip(self.columns, self.transforms, strict=True)):
             z = transform(drawn[:, column]) + shift[:, j]
             drawn[:, column] = transform.inverse(z)
-        return self._of_rows("corrected", drawn, level, len(rows))
+        return Prediction.of_pours("corrected", self.names, drawn, level, len(rows), pours)
 
     def _row(self, model: str, at: Array, level: float) -> Prediction:
         of = {"line": line_weights, "nearest": nearest_weights}[model]

@@ -71,6 +71,7 @@ class Prediction:
         rows: Array,
         level: float,
         pours: int | None = None,
+        asked: int | None = None,
     ) -> "Prediction":
         """Returns the mean of usable pours and the interval of one further pour.
 
@@ -80,6 +81,7 @@ class Prediction:
             rows: statistics, as many of each pour, shape (n, s).
             level: of the interval.
             pours: that the rows are of; each of one by default.
+            asked: pours that were made; those beyond `pours` could not be used, which is told.
 
         Raises:
             ObservationError: fewer than `FEWEST` pours.
@@ -91,11 +93,17 @@ class Prediction:
                 "needed: grains jam, leave the view or are unhealthy"
             )
         low, high = of_one_more(rows, level, pours)
-        few, least = (), fewest_of_ranks(level)
+        doubts: list[str] = []
+        least = fewest_of_ranks(level)
+        if asked is not None and pours < asked:
+            doubts.append(
+                f"{asked - pours} of {asked} pours under this condition jam, leave the view or are "
+                "unhealthy: middle and interval are of the others alone"
+            )
         if pours < least:
-            few = (
+            doubts.append(
                 f"{pours} usable pours are too few for ranks at {100 * level:g} %, {least} are "
                 "needed: the intervals are Student's t's of normal statistics, which may reach "
-                "beyond what a statistic can be",
+                "beyond what a statistic can be"
             )
-        return cls(model, names, rows.mean(axis=0), low, high, level, pours, few)
+        return cls(model, names, rows.mean(axis=0), low, high, level, pours, tuple(doubts))
