@@ -120,6 +120,25 @@ def test_a_bed_in_place_of_a_users_file_is_refused_before_the_pour(
     assert "those of 4 grains are not" in capsys.readouterr().err
 
 
+def test_a_name_that_ends_as_another_kind_of_file_is_refused_before_the_pour(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("granulcal.pours.simulate.simulate", lambda *_, **__: pytest.fail("poured"))
+    bed, material = tmp_path / "bed.ply", tmp_path / "material.in"
+    assert main(["export", "bed", "drop", "--to", "vtk", "-o", str(bed)]) == 2
+    assert "bed.ply ends in .ply, as files of ply do, and would hold vtk: let it end in .vtk" in (
+        capsys.readouterr().err
+    )
+    assert main(["export", "material", "drop", "--to", "mujoco", "-o", str(material)]) == 2
+    assert "as files of lammps and liggghts do, and would hold mujoco: let it end in .xml" in (
+        capsys.readouterr().err
+    )
+    assert not bed.exists() and not material.exists()
+    # Of an ending that no kind has nothing is said, and .in is of two engines.
+    for to, name in (("mujoco", "grains.txt"), ("liggghts", "material.in")):
+        assert main(["export", "material", "drop", "--to", to, "-o", str(tmp_path / name)]) == 0
+
+
 def test_young_is_refused_where_grains_are_rigid(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -229,13 +229,15 @@ def _scene(options: argparse.Namespace) -> int:
 def _bed(options: argparse.Namespace) -> int:
     from granulcal.arrays import read_array
     from granulcal.export import export_bed
-    from granulcal.export.mark import require_replaceable
+    from granulcal.export.bed import FORMATS
+    from granulcal.export.mark import require_ending, require_replaceable
     from granulcal.export.setup import Setup
     from granulcal.pours.simulate import simulate
 
     scene = _loaded(options)
     # What cannot be exported, and where it cannot be written, is told before a pour.
     Setup.of_bed(scene, options.to, options.seed)
+    require_ending(options.out, options.to, FORMATS)
     if options.to != "csv":
         require_replaceable([options.out])
     status = "at_rest"

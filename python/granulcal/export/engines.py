@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal.arrays import unmasked
 from granulcal.export import chrono, gazebo, isaac, lammps, liggghts, mujoco, newton, yade
-from granulcal.export.bed import bed_text
+from granulcal.export.bed import FORMATS, bed_text
 from granulcal.export.head import commented, head
 from granulcal.export.landing import DeepContactWarning, Landing
 from granulcal.export.law import LARGEST_YOUNG, LEAST_YOUNG
-from granulcal.export.mark import require_replaceable
+from granulcal.export.mark import require_ending, require_replaceable
 from granulcal.export.setup import Setup, require_funnel_in_place
 from granulcal.files import write_beside
 from granulcal.pours.scene import Scene
@@ -125,7 +125,8 @@ def export_material(
 
     Raises:
         ValueError: no such engine, a scene that cannot be exported, a Young's modulus of rigid
-            grains, or a file stands there that granulcal did not export.
+            grains, a name that ends as the file of another engine, or a file stands there that
+            granulcal did not export.
 
     Warns:
         DeepContactWarning: the grains are so soft that they go deep into what they fall on.
@@ -133,6 +134,7 @@ def export_material(
     text, file = material_text(scene, to, young=young, source=source), Path(path)
     if file.is_dir() or not file.suffix:
         file = file / f"material-{to}{MATERIAL_ENDINGS[to]}"
+    require_ending(file, to, MATERIAL_ENDINGS)
     require_replaceable([file])
     write_beside(file, text)
     return file
@@ -228,8 +230,8 @@ def export_bed(
     Raises:
         ValueError: a scene that cannot be exported (as points, `vtk`, `ply` and `csv`, it always can
             be where its grains are spheres), positions of another shape or that are no
-            numbers, no radii where the scene's differ and are not as many, or a file stands there
-            that granulcal did not export.
+            numbers, no radii where the scene's differ and are not as many, a name that ends as a
+            file of another kind, or a file stands there that granulcal did not export.
     """
     setup = Setup.of_bed(scene, kind, seed)
     centres = np.asarray(unmasked("positions", positions), float)
@@ -244,6 +246,7 @@ def export_bed(
         raise ValueError(f"radii must be positive [m], got {sizes.min():g} to {sizes.max():g}")
     setup = replace(setup, centres=centres, radii=sizes, walls=())
     text, file = bed_text(setup, kind), Path(path)
+    require_ending(file, kind, FORMATS)
     # CSV has no comments: there the kind of the file decides alone.
     if kind != "csv":
         require_replaceable([file])

@@ -1,10 +1,10 @@
 """What tells a file that granulcal exported from one of the user's own, and a name that is text alone."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-__all__ = ["MARK", "is_marked", "plain", "require_replaceable", "signed"]
+__all__ = ["MARK", "is_marked", "plain", "require_ending", "require_replaceable", "signed"]
 
 MARK = "exported by granulcal"
 """Stands in the first lines of every file whose format has comments."""
@@ -55,3 +55,23 @@ def require_replaceable(paths: Iterable[Path]) -> None:
                 f"{path} is left as it is: granulcal did not export it; choose another name or "
                 "folder, or move it away"
             )
+
+
+def require_ending(path: Path, kind: str, endings: Mapping[str, str]) -> None:
+    """Refuses a name that ends as a file of another kind: whoever opened it would take it for that.
+
+    Args:
+        path: the file.
+        kind: what it will hold.
+        endings: how files of each kind end; of any other ending nothing is said.
+
+    Raises:
+        ValueError: names the ending and that of the kind.
+    """
+    found, own = path.suffix.lower(), endings.get(kind)
+    if own is None or found == own or found not in endings.values():
+        return
+    others = [other for other, ending in endings.items() if ending == found]
+    raise ValueError(
+        f"{path} ends in {found}, as files of {' and '.join(others)} do, and would hold {kind}: let it end in {own}"
+    )
