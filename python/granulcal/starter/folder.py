@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import ceil
 from pathlib import Path
 
 from granulcal.files import replace_file
@@ -69,7 +70,10 @@ class Lens:
     @property
     def threshold(self) -> float:
         """Height from which a pixel counts as grain [m]."""
-        return round(max(3.0 * self.noise, _LEAST_THRESHOLD), 4)
+        least = max(3.0 * self.noise, _LEAST_THRESHOLD)
+        # Up to the next tenth of a millimetre: one that was rounded down would be within the noise,
+        # which `features` warns of.
+        return ceil(round(1e4 * least, 6)) / 1e4
 
 
 D435 = Lens(
