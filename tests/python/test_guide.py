@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+import granulcal as gc
 
 ROOT = Path(__file__).parents[2]
 # What makes them small; nothing else is changed.
@@ -52,3 +55,23 @@ def test_the_recordings_are_where_the_next_command_looks(tmp_path: Path) -> None
 def test_who_has_no_camera_types_what_makes_the_recordings() -> None:
     text = (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
     assert "`granulcal init couscous && cd couscous && granulcal sample`" in text
+
+
+def test_a_table_of_heights_becomes_a_recording_as_the_guide_makes_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
+    lines = re.findall(r'^ {4}((?:heights = |np\.savez\("couscous\.npz").*)$', text, flags=re.M)
+    assert len(lines) == 2
+    # A cone of 30 mm, 12 mm high, 0.5 mm from point to point, with a hole in its data.
+    side = np.arange(-50.0, 50.0, 0.5)
+    x, y = np.meshgrid(side, side)
+    table = np.maximum(12.0 * (1.0 - np.hypot(x, y) / 30.0), 0.0).astype(str)
+    table[5, 7] = ""
+    (tmp_path / "heights.csv").write_text("\n".join(",".join(row) for row in table))
+    monkeypatch.chdir(tmp_path)
+    exec("\n".join(lines), {"np": np})
+    scene = gc.Scene.drop(0.05, count=500).with_({"camera.field_width": 0.1})
+    pile = gc.Recording.open("couscous.npz").formation(**scene.reading)
+    assert pile.statistics()["max_z"] == pytest.approx(0.012, abs=0.001)
+    assert pile.statistics()["mean_r"] == pytest.approx(0.0185, abs=0.002)
