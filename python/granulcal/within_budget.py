@@ -80,10 +80,7 @@ def calibrate_within(
         raise ValueError("calibrate_within needs at least one recording, got none")
     round_sizes(budget)
     _require_fits(prior, scene)
-    if not isinstance(recordings, Sequence) or not all(
-        isinstance(each, Recording) for each in recordings
-    ):
-        raise TypeError("recordings must be a list of what Recording.open returns")
+    _require_recordings(recordings)
     for each in recordings:
         for doubt in each.doubts(scene, prior):
             warnings.warn(f"{each.path}: {doubt}", DoubtfulRecordingWarning, stacklevel=2)
@@ -101,6 +98,17 @@ def calibrate_within(
         made_for=MadeFor.of([each.path for each in recordings], observed),
     )
     return _inferred(pours, pours, NAMES, observed, budget, progress, ray)
+
+
+def _require_recordings(value: object) -> None:
+    """Raises TypeError unless `value` is a list of recordings."""
+    if not isinstance(value, Sequence) or isinstance(value, str):
+        raise TypeError(f"recordings must be a list of what Recording.open returns, got {value!r}")
+    for each in value:
+        if not isinstance(each, Recording):
+            raise TypeError(
+                f"recordings must be a list of what Recording.open returns, got {each!r} in it"
+            )
 
 
 def calibrate_observed(

@@ -205,6 +205,7 @@ def test_pairs_outside_of_a_narrower_prior_are_left_out():
         ((THETA.astype(str), X, Prior.default()), {}, TypeError, "theta must be .* real"),
         ((THETA, X > 0.5, Prior.default()), {}, TypeError, "dtype bool"),
         ((THETA,), {}, TypeError, "without theta"),
+        (("pours",), {}, TypeError, "one str without theta: gc.Dataset.load reads what"),
         ((THETA, X, Prior.default()), {"status": ["asleep"] * 80}, TrainingDataError, "asleep"),
         ((THETA, X, Prior.default()), {"status": ["at_rest"]}, TrainingDataError, "80 entries"),
         ((THETA, X, Prior.default()), {"x_names": ["a"]}, TrainingDataError, "1 x_names"),

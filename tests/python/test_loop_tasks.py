@@ -97,6 +97,11 @@ LOW, HIGH = '"start.height" = 0.03', '"start.height" = 0.1'
         ('effects = ["tilt.x"]', ', "effects.tilt.x" = 0', "tilt.x is the number effects.tilt.x, "),
         ('effects = ["count"]', ', "grains.count" = 90', "count is the number grains.count, which"),
         ('effects = ["funnel.lean"]', "", "funnel.lean cannot be 0.1 in this scene: .*a funnel"),
+        (
+            'nuisances = { "titl.x" = 0.01 }',
+            "",
+            "loop.toml: nuisances: no effect titl.x .is it tilt",
+        ),
         ('nuisances = { "count" = 1000 }', "", "tolerance of count must be at most 25 -, the whol"),
         ('nuisances = { "diameter" = 1.0 }', "", "tolerance of diameter must be at most 0.0004 m"),
         ('nuisances = { "gravity.2" = 1e3 }', "", "gravity.2 must be at most 9.81, the number its"),

@@ -204,6 +204,12 @@ def test_a_recording_of_which_half_is_hidden_is_doubtful_in_python_too(pour, tmp
     assert any("half.png: at" in str(each.message) for each in warned)
     with pytest.raises(TypeError, match=r"what Recording.open returns"):
         gc.calibrate_within(scene, prior, cast(Any, ["half.png"]), out=tmp_path / "out")
+    for wrong, told in (
+        (["half.png"], "got 'half.png' in it"),
+        (half, r"got Recording\('.*half.png"),
+    ):
+        with pytest.raises(TypeError, match=told):
+            gc.calibrate_within(scene, prior, cast(Any, wrong), out=tmp_path / "out")
     # They had no attribute `with_`, or `parameters`.
     for words, told in (
         ((cast(Any, "scene.toml"), prior), "scene must be a Scene, .* got 'scene.toml'"),

@@ -120,6 +120,8 @@ def test_pours_are_kept_and_never_made_twice(tmp_path):
     assert counted == [1, 2, 3] and left == [".pours.json.lock", "pours.json"]
     with pytest.raises(ValueError, match="another scene, prior or seed"):
         KeptPours(scene, prior, file, seed=1)
+    with pytest.raises(ValueError, match="give another folder, or remove the file"):
+        KeptPours(scene, prior, file, seed=1)
     file.write_text("{")
     with pytest.raises(ValueError, match="truncated or not JSON"):
         KeptPours(scene, prior, file)

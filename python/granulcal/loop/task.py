@@ -243,7 +243,7 @@ class Task:
         stated = [known.fixed | one.at for one in conditions]
         library = _chosen(named, scene, stated, between, file)
         ats = [one.at for one in _by_each(conditions, definitions)]
-        declared = declared_nuisances(document.get("nuisances", {}), scene, ats)
+        declared = _declared(document.get("nuisances", {}), scene, ats, file)
         names = {effect.name for effect in declared}
         if scene.observed_names:
             # What is observed has no power of a length: such a tolerance would forgive nothing.
@@ -504,6 +504,16 @@ def _named(names: list[str], file: Path) -> tuple[LibraryEffect, ...]:
         return by_name(names)
     except TrainingDataError as error:
         raise TrainingDataError(f"{file}: effects: {error}") from None
+
+
+def _declared(
+    table: dict, scene: Scene, ats: list[dict[str, float]], file: Path
+) -> tuple[LibraryEffect, ...]:
+    """The tolerances that a task's file declares."""
+    try:
+        return declared_nuisances(table, scene, ats)
+    except TrainingDataError as error:
+        raise TrainingDataError(f"{file}: nuisances: {error}") from None
 
 
 def _with_alike(library: tuple[LibraryEffect, ...], scene: Scene) -> tuple[LibraryEffect, ...]:

@@ -175,7 +175,8 @@ class KeptPours:
             )
         if key != self.key:
             raise ValueError(
-                f"{self.path} has the pours of another scene, prior or seed, or engine"
+                f"{self.path} has the pours of another scene, prior or seed, or engine; give "
+                "another folder, or remove the file"
             )
         stated = document.get("made_for")
         if stated is not None and made_for is not None:

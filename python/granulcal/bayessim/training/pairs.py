@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -92,6 +93,7 @@ class TrainingPairs:
                     raise TypeError(
                         "fit takes a data set with attributes theta and x, or theta and x "
                         f"as two arrays; got one {type(data).__name__} without {attribute}"
+                        f"{_what_reads(data)}"
                     )
             theta_values, x = data.theta, data.x
             theta_names = getattr(data, "theta_names", None)
@@ -316,3 +318,9 @@ def _scene_toml(scene: Any) -> str | None:
     except ValueError as error:
         raise TrainingDataError(f"scene: {error}") from None
     return text
+
+
+def _what_reads(data: object) -> str:
+    """What makes a data set of a path."""
+    is_path = isinstance(data, str | PathLike)
+    return ": gc.Dataset.load reads what `generate` wrote" if is_path else ""
