@@ -199,13 +199,18 @@ class OneOf:
     kinds: tuple[Schema, ...]
 
     def fault(self, value: Any, at: str) -> tuple[str, Any, str] | None:
-        """Returns what is wrong with the last of them, if with all."""
-        fault = None
+        """Returns what is wrong with the last of them, if with all.
+
+        A table or a list that one of them could be has its fault within: that is told first.
+        """
+        faults = []
         for kind in self.kinds:
             fault = kind.fault(value, at)
             if fault is None:
                 return None
-        return fault
+            faults.append(fault)
+        within = [fault for fault in faults if fault[0] != at]
+        return (within or faults)[-1]
 
 
 def check(

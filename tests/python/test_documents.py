@@ -102,6 +102,16 @@ recordings = ["0.png", "1.png", "2.png"]
         ('at = { "start.height" = 0.01 }', "at = 5", r"conditions\[0\].at must be a table"),
         ('use = "fit"', 'use = "fit"\nknown = 5', r"conditions\[0\].known must be a table"),
         ("effects =", "nuisances = 5\neffects =", "nuisances must be a table"),
+        (
+            "effects =",
+            'nuisances = { "tilt.x" = { sd = 1, shred = true } }\neffects =',
+            r"nuisances.tilt.x.shred must be absent, .*\(is it shared\?\)",
+        ),
+        (
+            "effects =",
+            'reading = { region = [1, "2"] }\neffects =',
+            r"region\[1\] must be a number",
+        ),
         ("effects =", 'between = "false"\neffects =', "between must be true or false, got 'false'"),
         ('effects = ["drag"]', "effects = []", "effects must be a list of at least 1"),
         ('use = "fit"', 'use = "fit"\naveraged = 1', "averaged must be true or false"),
