@@ -153,3 +153,12 @@ def test_pandas_gets_every_column(small_data):
     frame = small_data.to_pandas()
     assert isinstance(frame, pandas.DataFrame)
     assert frame.shape == (80, len(small_data.columns()))
+
+
+@pytest.mark.parametrize("name", ["pours.csv", "pours.CSV", "pours.npz"])
+def test_parquet_is_not_written_under_the_name_of_another_table(
+    name: str, small_data: gc.Dataset, tmp_path: Path
+) -> None:
+    with pytest.raises(ValueError, match=f"{name}: a data set is saved as Parquet"):
+        small_data.save(tmp_path / name)
+    assert not list(tmp_path.iterdir())

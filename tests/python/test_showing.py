@@ -1,6 +1,7 @@
 """What is made to be viewed: films, notebooks' HTML, ArviZ."""
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -123,3 +124,10 @@ def test_arviz_gets_the_draws() -> None:
     assert np.array_equal(values.ravel(), posterior.sample(400, 2)[:, 0])
     with pytest.raises(ValueError, match="at least chains"):
         posterior.to_arviz(2, chains=4)
+
+
+def test_who_has_no_arviz_is_told_where_it_comes_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "arviz", None)
+    toy = LinearGaussian.random(bounded=True)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'granulcal\[arviz\]'"):
+        toy.posterior(toy.simulate(1)[1][0]).to_arviz()

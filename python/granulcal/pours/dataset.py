@@ -33,6 +33,9 @@ __all__ = ["Dataset", "generate"]
 
 Array = NDArray[np.float64]
 
+# Who opened Parquet by one of these names would not find it.
+_OTHER_TABLES = (".csv", ".tsv", ".txt", ".json", ".xlsx", ".feather", ".npy", ".npz")
+
 
 class Dataset:
     """Parameters and statistics of many pours, one row each.
@@ -108,7 +111,16 @@ class Dataset:
         return cls(native, Path(path))
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Writes all rows, with scene, prior and versions, as one Parquet file."""
+        """Writes all rows, with scene, prior and versions, as one Parquet file.
+
+        Raises:
+            ValueError: the name ends as that of a table of another kind.
+        """
+        if Path(path).suffix.lower() in _OTHER_TABLES:
+            raise ValueError(
+                f"{path}: a data set is saved as Parquet: let the name end in .parquet, or write "
+                "another table of to_pandas() or columns()"
+            )
         self._native.write(path)
 
     @cached_property

@@ -282,7 +282,11 @@ class Posterior:
         Raises:
             ModuleNotFoundError: arviz is not installed (`granulcal[arviz]`).
         """
-        import arviz  # pyright: ignore[reportMissingImports]
+        try:
+            import arviz  # pyright: ignore[reportMissingImports]
+        except ModuleNotFoundError as error:
+            told = "arviz is not installed: pip install 'granulcal[arviz]'; sample() is arrays"
+            raise ModuleNotFoundError(told, name=error.name) from None
 
         if chains < 1 or draws < chains:
             raise ValueError(f"draws must be at least chains, and chains 1, got {draws}, {chains}")
