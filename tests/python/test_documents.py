@@ -134,6 +134,20 @@ def test_tasks_are_refused_by_name(tmp_path, old, new, said):
         Task.load(path)
 
 
+def test_a_byte_order_mark_is_no_part_of_a_document(tmp_path):
+    """Editors of Windows begin a file with one."""
+    (tmp_path / "scene.toml").write_text(gc.Scene.drop(0.01, count=12).to_toml(), "utf-8-sig")
+    (tmp_path / "prior.toml").write_text(gc.Prior.default().to_toml(), "utf-8-sig")
+    lens = "width = 64\nheight = 48\nfx = 60.0\nfy = 60.0\ncx = 31.5\ncy = 23.5\n"
+    (tmp_path / "camera.toml").write_text(lens, "utf-8-sig")
+    for i in range(3):
+        (tmp_path / f"{i}.png").write_bytes(b"\x89PNG")
+    (tmp_path / "loop.toml").write_text(TASK, "utf-8-sig")
+    assert Task.load(tmp_path / "loop.toml").prior == gc.Prior.default()
+    assert gc.Camera.load(tmp_path / "camera.toml", height=0.3) is not None
+    assert parse_json(b"\xef\xbb\xbf[1]", "a.json") == [1]
+
+
 def test_a_file_name_is_no_scene(tmp_path):
     with pytest.raises(TypeError, match="scene must be a Scene"):
         gc.simulate("scene.toml")  # pyright: ignore[reportArgumentType]

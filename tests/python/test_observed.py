@@ -1,13 +1,14 @@
 """Statistics that a scene observes: of pours, in data sets, and measured."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import granulcal as gc
 from granulcal import _native
-from granulcal.measured import DischargeCurve, DrumImage, RunOut
+from granulcal.measured import DischargeCurve, DrumImage, NamedValues, RunOut
 
 _OBSERVE = """
 [observe]
@@ -193,6 +194,15 @@ def test_a_discharge_curve_gives_shares_and_rate(scene: gc.Scene, tmp_path: Path
     path.write_text("time,percent\n0,0\n")
     with pytest.raises(ValueError, match="the columns must be"):
         DischargeCurve.open(path)
+    # With the mark that a spreadsheet writes before a table of UTF-8.
+    path.write_text("\n".join([rows[0], "a,0,0", "a,1,50", "a,2,90"]) + "\n", "utf-8-sig")
+    assert len(DischargeCurve.open(path).time) == 3
+    # A table of statistics with other commas, and a map of heights.
+    for text in ("statistic;value", ",".join(["0.0"] * 500)):
+        path.write_text(f"{text}\n")
+        with pytest.raises(ValueError, match="or statistic,value of a table, got") as told:
+            DischargeCurve.open(path)
+        assert len(str(told.value)) < len(str(path)) + 250
 
 
 def test_what_stays_behind_does_not_slow_a_discharge(scene: gc.Scene, tmp_path: Path) -> None:
@@ -216,6 +226,17 @@ def test_a_measured_rate_is_that_of_pours() -> None:
     assert np.isnan(DischargeCurve(series="a", time=times[:2], percent=times[:2]).rate())
     with pytest.raises(ValueError, match="one number for each of the 301 of time, got 2"):
         _native.discharge_rate(times, times[:2])
+
+
+@pytest.mark.parametrize("kind", [DischargeCurve, NamedValues])
+def test_what_is_no_table_is_refused_by_its_name(kind: Any, tmp_path: Path) -> None:
+    path = tmp_path / "weighed.csv"
+    # A field of more than the 131,072 letters that are read, and letters of another code.
+    for data in (b"1" * 200_000, "statistic,value\ngr\u00f6\u00dfe,1\n".encode("latin-1")):
+        path.write_bytes(data)
+        with pytest.raises(ValueError, match=r"weighed\.csv") as told:
+            kind.open(path).observed(gc.Scene.drop(0.02, count=4))
+        assert "codec" not in str(told.value)
 
 
 def test_numbers_measured_by_other_means_have_their_names(scene: gc.Scene, tmp_path: Path) -> None:

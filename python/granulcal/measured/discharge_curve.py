@@ -1,15 +1,14 @@
 """Discharge curves: percent that has run out against time, as CSV."""
 
-import csv
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
 from granulcal.measured.names import observed_of, value_at
+from granulcal.measured.table import rows_of
 from granulcal.pours.scene import Scene
 from granulcal.pours.statistics import ObservedStatistics
 
@@ -18,6 +17,8 @@ __all__ = ["DischargeCurve"]
 Array = NDArray[np.float64]
 
 _HEADER = ["series", "time_s", "discharged_percent"]
+# Letters of another header that a message shows.
+_SHOWN = 60
 # Percent by which a weighed share may be off: what swings on a balance falls and overshoots.
 _MARGIN = 1.0
 
@@ -46,26 +47,30 @@ class DischargeCurve:
                 series, or one that falls or hardly begins; the message says what there is.
         """
         points: dict[str, list[tuple[float, float, int]]] = {}
-        with Path(path).open(newline="", encoding="utf-8-sig") as file:
-            rows = csv.reader(file)
-            header = [name.strip() for name in next(rows, [])]
-            if header != _HEADER:
-                raise ValueError(f"{path}: the columns must be {_HEADER}, got {header}")
-            for number, row in enumerate(rows, start=2):
-                if not row:
-                    continue
-                try:
-                    name, time, percent = row
-                    point = float(time), float(percent), number
-                except ValueError:
-                    message = f"{path}: line {number} must be a name and two numbers, got {row}"
-                    raise ValueError(message) from None
-                if not (np.isfinite(point[0]) and -_MARGIN <= point[1] <= 100.0 + _MARGIN):
-                    raise ValueError(
-                        f"{path}: line {number} must be a finite time and a share from 0 to 100 %, "
-                        f"got {row}"
-                    )
-                points.setdefault(name, []).append(point)
+        rows = rows_of(path)
+        header = [name.strip() for name in next(rows, [])]
+        if header != _HEADER:
+            found = ",".join(header)
+            found = found if len(found) <= _SHOWN else f"{found[:_SHOWN]}..."
+            raise ValueError(
+                f"{path}: the columns must be {','.join(_HEADER)} of a discharge curve, or "
+                f"statistic,value of a table, got {found!r}"
+            )
+        for number, row in enumerate(rows, start=2):
+            if not row:
+                continue
+            try:
+                name, time, percent = row
+                point = float(time), float(percent), number
+            except ValueError:
+                message = f"{path}: line {number} must be a name and two numbers, got {row}"
+                raise ValueError(message) from None
+            if not (np.isfinite(point[0]) and -_MARGIN <= point[1] <= 100.0 + _MARGIN):
+                raise ValueError(
+                    f"{path}: line {number} must be a finite time and a share from 0 to 100 %, "
+                    f"got {row}"
+                )
+            points.setdefault(name, []).append(point)
         if series is None and len(points) == 1:
             series = next(iter(points))
         if series is None or series not in points:

@@ -1,6 +1,5 @@
 """Statistics that were measured by whatever means, each with its name and its value."""
 
-import csv
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from granulcal.documents import Mapping, Maybe, Number, Table, meant, read_json
+from granulcal.measured.table import rows_of
 from granulcal.pours.scene import Scene
 from granulcal.pours.statistics import ObservedStatistics
 
@@ -23,8 +23,11 @@ def is_of_named_values(path: str | PathLike[str]) -> bool:
     """Returns whether a file is JSON, or a table with the columns statistic and value."""
     if Path(path).suffix.lower() == _JSON:
         return True
-    with Path(path).open(newline="", encoding="utf-8", errors="replace") as file:
-        return _words(next(csv.reader(file), [])) == _HEADER
+    try:
+        return _words(next(rows_of(path), [])) == _HEADER
+    except ValueError:
+        # No table at all, which whoever reads it says.
+        return False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,17 +60,16 @@ class NamedValues:
                 values={n: nothing if v is None else float(v) for n, v in found.items()},
             )
         values: dict[str, float] = {}
-        with where.open(newline="", encoding="utf-8") as file:
-            rows = csv.reader(file)
-            if (header := _words(next(rows, []))) != _HEADER:
-                raise ValueError(f"{path}: the columns must be {_HEADER}, got {header}")
-            for number, row in enumerate(map(_words, rows), start=2):
-                if not row:
-                    continue
-                name, value = _statistic(row, f"{path}: line {number}")
-                if name in values:
-                    raise ValueError(f"{path}: line {number}: {name} stands there twice")
-                values[name] = value
+        rows = rows_of(where)
+        if (header := _words(next(rows, []))) != _HEADER:
+            raise ValueError(f"{path}: the columns must be {_HEADER}, got {header}")
+        for number, row in enumerate(map(_words, rows), start=2):
+            if not row:
+                continue
+            name, value = _statistic(row, f"{path}: line {number}")
+            if name in values:
+                raise ValueError(f"{path}: line {number}: {name} stands there twice")
+            values[name] = value
         return cls(path=where, values=values)
 
     def observed(self, scene: Scene) -> ObservedStatistics:
@@ -92,8 +94,8 @@ class NamedValues:
 
 
 def _words(row: list[str]) -> list[str]:
-    """The cells without the blanks, and the mark of some spreadsheets, about them."""
-    return [cell.strip().removeprefix("\ufeff") for cell in row]
+    """The cells without the blanks about them."""
+    return [cell.strip() for cell in row]
 
 
 def _statistic(row: list[str], where: str) -> tuple[str, float]:
