@@ -402,6 +402,27 @@ def test_a_misspelt_name_is_answered_with_the_one_that_was_meant(
     assert f"did you mean {meant}?" in capfd.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["film", "drop", "-o", "x.gif", "--fps", "fast"], "--fps: must be a number, got 'fast'"),
+        (["model", "drop", "-n", "1e3"], "-n/--pours: must be a whole number, got '1e3'"),
+        (
+            ["report", "funnel", "x", "-o", "y", "--frames", "few"],
+            "of at least 1, or all, got 'few'",
+        ),
+        (["design", "rings", "drop", "-o", "x", "--ring", "a", "1"], "--ring: must be a number"),
+    ],
+)
+def test_what_is_no_number_is_not_told_in_words_of_python(
+    words: list[str], told: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """It had been an `invalid float value`, and an `invalid _frames value`."""
+    assert main(words) == 2
+    said = capfd.readouterr().err
+    assert told in said and "invalid" not in said
+
+
 def test_a_file_that_is_not_there_is_named_without_the_number_of_the_error(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -10,6 +10,9 @@ from granulcal.words import did_you_mean
 
 __all__ = ["Parser", "describe"]
 
+# What argparse calls by the names of Python's types.
+_NUMBERS = {"int": "a whole number", "float": "a number"}
+
 
 class Parser(argparse.ArgumentParser):
     """An argument parser that asks `did you mean` when an option is misspelt."""
@@ -32,6 +35,8 @@ class Parser(argparse.ArgumentParser):
             argparse.ArgumentParser.error(parser, message)
         if given := re.fullmatch(r"argument (\S+): ignored explicit argument '(.*)'", message):
             message = _takes_no_value(given[1], given[2])
+        if given := re.fullmatch(r"(argument \S+): invalid (int|float) value: (.*)", message):
+            message = f"{given[1]}: must be {_NUMBERS[given[2]]}, got {given[3]}"
         super().error(message)
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:

@@ -146,7 +146,11 @@ def exit_code_of(recordings: Sequence[Any], is_healthy: bool = True) -> int:
 def _frames(text: str) -> int | None:
     if text == "all":
         return None
-    frames = int(text)
+    try:
+        frames = int(text)
+    except ValueError:
+        told = f"must be a whole number of at least 1, or all, got {text!r}"
+        raise argparse.ArgumentTypeError(told) from None
     if frames < 1:
         raise argparse.ArgumentTypeError(f"must be at least 1, or all, got {frames}")
     return frames
