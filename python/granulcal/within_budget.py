@@ -70,9 +70,10 @@ def calibrate_within(
             that were made for other recordings.
 
     Warns:
-        DoubtfulRecordingWarning: what `Recording.doubts` says.
+        DoubtfulRecordingWarning: what `Recording.doubts` says, or a funnel above the camera.
     """
     from granulcal.bayessim.training.sequential import round_sizes
+    from granulcal.loop.recorded import doubt_of_funnel
 
     require_scene(scene)
     require_prior(prior)
@@ -81,6 +82,8 @@ def calibrate_within(
     round_sizes(budget)
     _require_fits(prior, scene)
     _require_recordings(recordings)
+    for doubt in doubt_of_funnel("the scene", scene):
+        warnings.warn(doubt, DoubtfulRecordingWarning, stacklevel=2)
     for each in recordings:
         for doubt in each.doubts(scene, prior):
             warnings.warn(f"{each.path}: {doubt}", DoubtfulRecordingWarning, stacklevel=2)

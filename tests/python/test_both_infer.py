@@ -13,6 +13,7 @@ import granulcal as gc
 from granulcal import _native, cli
 from granulcal.bayessim import BayesSim
 from granulcal.bayessim.check.identifiability import Identifiability
+from granulcal.errors import DoubtfulRecordingWarning
 
 FIELDS = {
     "recordings", "parameters", "inside_model", "identifiability", "calibrated", "warnings",
@@ -294,6 +295,36 @@ def test_calibrate_tells_what_makes_a_recording_doubtful(
     assert cli.main([*words, "-o", str(tmp_path / "run")]) == 2
     err = capfd.readouterr().err
     assert f"warning: {image}: " in err and "the others are out of view" in err
+
+
+def test_calibrate_asks_about_a_funnel_above_the_camera_before_it_pours(
+    tmp_path, capfd, monkeypatch
+):
+    """As with a height in another unit: pours had been made from 12 m, and were out of view."""
+    poured = gc.Scene.funnel(height=0.05).with_({"grains.count": 60}, preset="fast")
+    camera = gc.Camera.overhead(height=0.29, field_width=0.58, pixels=240)
+    pour = gc.simulate(poured, seed=1)
+    image, toml = camera.record(pour.positions, pour.radii, tmp_path)
+    scene, prior = poured.with_({"funnel.height": 12.0}), gc.Prior.default()
+    (tmp_path / "scene.toml").write_text(scene.to_toml())
+    (tmp_path / "prior.toml").write_text(prior.to_toml())
+    twice = [gc.Recording.open(image, camera=toml)] * 2
+    with (
+        pytest.warns(DoubtfulRecordingWarning) as told,
+        pytest.raises(ValueError, match="one form"),
+    ):
+        gc.calibrate_within(scene, prior, twice, out=tmp_path / "run")
+    asked = "the scene: the funnel's tip (funnel.height = 12 m) is above the camera"
+    assert any(asked in str(each.message) for each in told)
+
+    def stopped(*_: Any, **__: Any) -> None:
+        raise ValueError("no pours here")
+
+    monkeypatch.setattr("granulcal.within_budget.calibrate_within", stopped)
+    words = ["calibrate", *(str(tmp_path / name) for name in ("scene.toml", "prior.toml"))]
+    words += [str(image), "--camera", str(toml), "-o", str(tmp_path / "run")]
+    assert cli.main(words) == 2
+    assert f"warning: {asked}" in capfd.readouterr().err
 
 
 def test_a_pile_that_no_material_explains_is_outside_for_report_and_calibrate(
