@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import granulcal as gc
+from granulcal.cli import main
 
 ROOT = Path(__file__).parents[2]
 # What makes them small; nothing else is changed.
@@ -75,3 +76,27 @@ def test_a_table_of_heights_becomes_a_recording_as_the_guide_makes_it(
     pile = gc.Recording.open("couscous.npz").formation(**scene.reading)
     assert pile.statistics()["max_z"] == pytest.approx(0.012, abs=0.001)
     assert pile.statistics()["mean_r"] == pytest.approx(0.0185, abs=0.002)
+
+
+def test_a_recording_without_a_lens_is_begun_as_the_guide_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    image = pytest.importorskip("PIL.Image")
+    text = (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
+    (words,) = re.findall(r"`(--recording couscous\.png [^`]+)`", text)
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "couscous", "--scene", "drop"]) == 0
+    own = Path("couscous", "camera.toml")
+    lines = own.read_text(encoding="utf-8")
+    for key, value in {"fx": "600.0", "fy": "600.0", "depth_unit": "0.001"}.items():
+        lines = re.sub(rf"(?m)^{key} = [\d.]+", f"{key} = {value}", lines)
+    own.write_text(lines, encoding="utf-8")
+    # A heap under that lens, half a metre away, in millimetres.
+    pour = gc.simulate(gc.Scene.drop(0.02, count=60, preset="fast"), seed=1)
+    camera = gc.Camera.load(own, height=0.5)
+    counts = np.round(1e3 * camera.render(pour.positions, pour.radii)).astype(np.uint16)
+    image.fromarray(counts).save("couscous.png")
+    assert main(["init", "couscous", "--scene", "drop", *words.split()]) == 0
+    scene = gc.Scene.load("couscous/scene.toml")
+    assert scene.get("camera.height") == pytest.approx(0.5, abs=0.001)
+    assert scene.get("camera.field_width") == pytest.approx(480 * 0.5 / 600, rel=0.01)
