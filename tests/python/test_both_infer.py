@@ -1,5 +1,6 @@
 """`granulcal infer` and `granulcal-cli infer`: one answer, and Python's library says the same."""
 
+import contextlib
 import json
 import re
 import shutil
@@ -377,3 +378,12 @@ def _recorded(folder, *, height: float, field_width: float, pixels: int, seed: i
     boxes = np.c_[generator.uniform(-0.6, 0.6, (12, 2)), np.full(12, 0.25)]
     image, toml = camera.record(boxes, np.full(12, 0.25), folder)
     return [str(image), "--camera", str(toml)]
+
+
+@pytest.mark.parametrize("word", ["infer", "calibrate", "report"])
+def test_who_has_frames_as_images_is_told_that_they_are_one_recording(word, capfd):
+    """One by one they count as pours: no check knows frames of one from pours of one material."""
+    with contextlib.suppress(SystemExit):
+        cli.main([word, "--help"])
+    told = " ".join(capfd.readouterr().out.split())
+    assert "each another pour (PNGs of one are a folder)" in told

@@ -41,7 +41,8 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         type=RECORDING,
         nargs="+",
         help=".bag, .mcap, .npz height map, 16-bit depth PNG, .npy or folder of PNGs; "
-        "several: pours of one material under one condition",
+        "several: pours of one material under one condition, each another pour (PNGs of one are a "
+        "folder)",
     )
     parser.add_argument(
         "--camera",
