@@ -250,6 +250,11 @@ def test_a_pour_that_jams_is_told():
     assert [note.split(":")[0] for note in pattern.notes] == ["pour 2 jams"]
 
 
+def test_pours_of_the_training_are_no_check(line):
+    with pytest.raises(ValueError, match="200 of the 200 pours .* trained on: another seed"):
+        line.check(_Line())
+
+
 def test_a_model_of_another_material_is_not_taken_for_ones_own(tmp_path):
     scene = observing_radii(gc.Scene.funnel(count=60, preset="fast"))
     prior = height_prior((0.08, 0.13))

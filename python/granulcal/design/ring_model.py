@@ -226,9 +226,22 @@ class RingModel:
         return self.check(data)
 
     def check(self, data: Dataset) -> HeldOut:
-        """Returns heights inferred from the usable pours of a data set that was not trained on."""
+        """Returns heights inferred from the usable pours of a data set that was not trained on.
+
+        Raises:
+            ValueError: it was.
+        """
         usable = data.is_usable
         heights, radii = data.theta[usable, 0], data.x[usable]
+        trained, own = (
+            set(map(tuple, np.column_stack(pours).tolist()))
+            for pours in ((self.reach.heights, self.reach.radii), (heights, radii))
+        )
+        if seen := len(trained & own):
+            raise ValueError(
+                f"{seen} of the {len(heights)} pours that are to check the model are those that it "
+                "was trained on: another seed makes others"
+            )
         posteriors = [self.bayes.posterior(row) for row in radii]
         return HeldOut(
             heights=heights,
