@@ -11,6 +11,8 @@ use crate::preset::Preset;
 use crate::scene::Scene;
 use crate::start::Start;
 
+/// Radius of a column of liquid in radii of a typical grain, which are the width of its rings: there are 2048 at most.
+const WIDEST_LIQUID: f64 = 2000.0;
 /// Largest ratio of a listed diameter to that of a typical grain, and one over the smallest `[-]`.
 const UNLIKE: f64 = 50.0;
 
@@ -168,6 +170,11 @@ impl Scene {
             ("bed", self.bed.is_some()),
         ];
         if self.effects.liquid.is_on() {
+            let radius = self.effects.liquid.radius;
+            if radius > WIDEST_LIQUID * self.grains.radius() {
+                let allowed = "at most 2000 radii of a grain";
+                return Err(SceneError::range("effects.liquid.radius", radius, allowed));
+            }
             return exclude("effects.liquid", &others);
         }
         if self.observe.as_ref().is_some_and(Observe::asks_for_liquid) {
@@ -288,6 +295,15 @@ mod tests {
                 Scene::drop(0.1).with(path, value).unwrap();
             }
         }
+    }
+
+    #[test]
+    fn a_liquid_of_more_rings_than_there_are_is_refused() {
+        let mut scene = Scene::drop(0.1);
+        (scene.effects.liquid.height, scene.effects.liquid.radius) = (0.01, 4.0);
+        scene.check().unwrap();
+        let said = scene.with("effects.liquid.radius", 4.1).unwrap_err().to_string();
+        assert!(said.contains("effects.liquid.radius must be at most 2000 radii"), "{said}");
     }
 
     #[test]

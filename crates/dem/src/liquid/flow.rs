@@ -23,10 +23,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::ground::{DRY, Ground};
-use super::solids::Solids;
-
-/// Rings, at most: liquid that goes farther is gone.
-const MOST_RINGS: usize = 2048;
+use super::solids::{MOST_RINGS, Solids};
 
 /// Liquid in rings about the axis.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

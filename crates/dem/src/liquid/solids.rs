@@ -13,6 +13,8 @@ use std::f64::consts::PI;
 use crate::effect::PACKED;
 use crate::particles::Particles;
 
+/// Rings, at most: liquid that comes to the last stands there.
+pub(super) const MOST_RINGS: usize = 2048;
 /// Solid fraction that no grains exceed `[-]`.
 const DENSEST: f64 = 0.64;
 
@@ -40,7 +42,8 @@ impl Solids {
                 0.25 * (2.0 + 3.0 * x - x.powi(3))
             };
             let first = ((distance - radius) / ring).max(0.0) as usize;
-            let last = ((distance + radius) / ring) as usize;
+            // Grains that have been thrown far must not ask for rings that no liquid reaches.
+            let last = (((distance + radius) / ring) as usize).min(MOST_RINGS);
             if sums.len() <= last {
                 sums.resize(last + 1, [0.0; 2]);
             }
@@ -123,6 +126,17 @@ mod tests {
         let s = &found.thickness;
         assert!(s[12] == 0.0 && s[13] > 0.0 && s[16] > 0.0 && s[17] == 0.0);
         assert!((found.top(14) - 2.0 * RADIUS).abs() < 1e-15);
+    }
+
+    #[test]
+    fn grains_far_away_ask_for_no_rings() {
+        let near = [[0.0, 0.0, 0.1]];
+        for far in [1e3, 1e9, 1e300] {
+            let found = Solids::of(&grains(&[near[0], [far, 0.0, 0.1]]), 2e-3);
+            assert!(found.thickness.len() <= MOST_RINGS + 1);
+            let alone = Solids::of(&grains(&near), 2e-3);
+            assert_eq!(found.thickness[..alone.thickness.len()], alone.thickness);
+        }
     }
 
     #[test]
