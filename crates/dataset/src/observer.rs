@@ -69,7 +69,7 @@ fn observations(scene: &Scene) -> Vec<Box<dyn Observation>> {
         all.push(Box::new(radius::Radius::new(spec)));
     }
     if let Some(spec) = &observe.spill {
-        all.push(Box::new(spill::Spill::new(spec)));
+        all.push(Box::new(spill::Spill::new(spec, scene)));
     }
     if let Some(spec) = &observe.images {
         all.push(Box::new(images::Images::new(spec, &scene.camera)));

@@ -68,7 +68,8 @@ pub struct Pour {
     pub status: Status,
     /// Whether it can be trusted, in numbers.
     pub health: Health,
-    /// Grains whose centre is in the funnel ([`crate::Scene::is_in_funnel`]); 0 where there is none.
+    /// Grains whose centre, of several spheres that of one, is in the funnel ([`crate::Scene::is_in_funnel`]); 0 where
+    /// there is none.
     pub grains_in_funnel: usize,
     /// Simulated time `[s]`.
     pub simulated_s: f64,

@@ -362,7 +362,7 @@ impl Simulation {
             angular_velocities: self.angular_velocities(),
             status: self.ended.unwrap_or(Status::Horizon),
             health: self.health(),
-            grains_in_funnel: self.in_funnel().count(),
+            grains_in_funnel: self.grains_in_funnel(),
             simulated_s: self.time(),
             state_hash: self.state_hash(),
             positions: self.positions(),

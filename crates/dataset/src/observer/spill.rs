@@ -1,8 +1,8 @@
 //! Grains that have come to lie outside a circle.
 
 use granulcal_dem::Pour;
-use granulcal_scene::ObserveSpill;
-use nalgebra::Vector2;
+use granulcal_scene::{ObserveSpill, Scene};
+use nalgebra::{Vector2, Vector3};
 
 use super::observation::{Observation, ObservedStatistic};
 
@@ -10,11 +10,13 @@ use super::observation::{Observation, ObservedStatistic};
 #[derive(Clone, Debug)]
 pub(super) struct Spill {
     spec: ObserveSpill,
+    /// Spheres of a grain: pours are told sphere by sphere.
+    spheres: usize,
 }
 
 impl Spill {
-    pub(super) fn new(spec: &ObserveSpill) -> Self {
-        Self { spec: spec.clone() }
+    pub(super) fn new(spec: &ObserveSpill, scene: &Scene) -> Self {
+        Self { spec: spec.clone(), spheres: scene.effects.clump.members() }
     }
 }
 
@@ -27,7 +29,9 @@ impl Observation for Spill {
 
     fn values(&self, pour: &Pour) -> Vec<f64> {
         let axis = Vector2::from(self.spec.axis);
-        let is_out = |x: &&nalgebra::Vector3<f64>| (x.xy() - axis).norm() > self.spec.radius;
-        vec![pour.positions.iter().filter(is_out).count() as f64]
+        let centre =
+            |grain: &[Vector3<f64>]| grain.iter().sum::<Vector3<f64>>() / grain.len() as f64;
+        let is_out = |x: &Vector3<f64>| (x.xy() - axis).norm() > self.spec.radius;
+        vec![pour.positions.chunks(self.spheres).map(centre).filter(is_out).count() as f64]
     }
 }

@@ -91,6 +91,19 @@ fn a_falling_grain_is_seen_where_it_is() {
 }
 
 #[test]
+fn a_spilled_grain_of_several_spheres_is_one() {
+    let mut scene = scene();
+    scene.grains.count = 2;
+    (scene.effects.clump.spheres, scene.effects.clump.aspect) = (3, 2.0);
+    // The one is out, the other is not, though it may reach beyond.
+    scene.start = Start::Positions { positions: vec![[0.03, 0.0, 0.01], [0.019, 0.0, 0.01]] };
+    scene.observe.as_mut().unwrap().surface = None;
+    let (pour, observer) = run(&scene);
+    assert_eq!(pour.positions.len(), 6);
+    assert_eq!(value(&scene, &observer.observed(&pour), "spilled"), 1.0);
+}
+
+#[test]
 fn a_front_that_is_not_seen_to_its_end_has_none() {
     let mut scene = scene();
     scene.observe.as_mut().unwrap().front.as_mut().unwrap().end = false;

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 
 use super::Simulation;
 use super::rest::Rest;
+use crate::clumps::Clumps;
 use crate::law::INVERSE_INERTIA;
 use crate::pour::Status;
 
@@ -150,7 +151,16 @@ impl Simulation {
         across.dot(&later.xy()) > 0.0
     }
 
-    /// The grains that are in the funnel, if the scene has one.
+    /// Number of the grains that are in the funnel, of several spheres with one of them at least.
+    pub(super) fn grains_in_funnel(&self) -> usize {
+        let members = self.clumps.as_ref().map_or(1, Clumps::members);
+        let mut held: Vec<_> = self.in_funnel().map(|sphere| sphere / members).collect();
+        // Spheres of a grain follow one another.
+        held.dedup();
+        held.len()
+    }
+
+    /// The grains that are in the funnel, if the scene has one; of several spheres the spheres.
     pub(super) fn in_funnel(&self) -> impl Iterator<Item = usize> {
         let scene = &self.origin.scene;
         let time = self.time();

@@ -352,3 +352,12 @@ fn a_grain_that_sinks_slower_than_the_threshold_ends_at_the_horizon() {
     // As dense as the grain: it stays where it is.
     assert_eq!(honey(2650.0, 3000.0).status, Status::AtRest);
 }
+
+#[test]
+fn grains_of_several_spheres_in_a_funnel_are_counted_once() {
+    let mut scene = Scene::funnel(0.12);
+    scene.grains.count = 20;
+    scene.effects.clump.aspect = 1.5;
+    let pour = Simulation::new(&scene, 1).unwrap().to_pour();
+    assert_eq!((pour.positions.len(), pour.grains_in_funnel), (40, 20));
+}
