@@ -7,6 +7,7 @@ use crate::bodies::{Bodies, Within};
 use crate::clumps::Clumps;
 use crate::contact_context::ContactContext;
 use crate::error::DemError;
+use crate::law::is_parted;
 use crate::neighbor::PairSearch;
 use crate::parallel::Threads;
 use crate::path::{Path, Reach};
@@ -51,8 +52,8 @@ impl TooDeep {
 
 impl Simulation {
     /// Refuses grains that would leave the scene before they move, and those that are deep in a wall now or, where the
-    /// start states every place, in each other, which a pour could only answer by throwing them apart. To ask before the
-    /// first substep, of a start that somebody has written.
+    /// start states every place or space repeats, in each other, which a pour could only answer by throwing them apart.
+    /// To ask before the first substep, of a start that somebody has written.
     ///
     /// # Errors
     /// [`DemError::StartBelowOutflow`]; [`DemError::StartInWall`] names the wall that most grains are in, how many they
@@ -66,8 +67,11 @@ impl Simulation {
                 return Err(DemError::StartBelowOutflow { grains, below });
             }
         }
-        // Elsewhere grains stand on a lattice that keeps them apart, or are parted.
-        let are_stated = self.origin.scene.start.is_listed();
+        // Elsewhere grains stand on a lattice that keeps them apart, unless it meets itself where space repeats, or are
+        // parted.
+        let scene = &self.origin.scene;
+        let repeats = scene.periodic.is_some() && !is_parted(scene);
+        let may_meet = scene.start.is_listed() || repeats;
         let mut around = self.around.clone();
         around.move_walls(self.time());
         let mut found = TooDeep::default();
@@ -75,7 +79,7 @@ impl Simulation {
             bodies_too_deep(bodies, &around, &mut found);
         } else {
             self.balls_in_walls(&around.walls, &mut found);
-            if are_stated {
+            if may_meet {
                 self.balls_in_each_other(&mut found);
             }
         }
@@ -85,7 +89,7 @@ impl Simulation {
             return Err(DemError::StartInWall { wall, grains, depth, allowed: MAX_DEPTH });
         }
         match found.deepest {
-            Some((deepest, depth)) if are_stated => {
+            Some((deepest, depth)) if may_meet => {
                 let (pairs, allowed) = (found.pairs, MAX_DEPTH);
                 Err(DemError::StartInEachOther { pairs, deepest, depth, allowed })
             }
@@ -162,7 +166,7 @@ fn bodies_too_deep(bodies: &Bodies, around: &ContactContext, found: &mut TooDeep
 #[cfg(test)]
 mod tests {
     use crate::{DemError, Motion, Scene, Simulation, WallMaterial};
-    use granulcal_scene::{Ends, GrainShape, Outflow, Shape, Start, Wall};
+    use granulcal_scene::{Ends, GrainShape, Outflow, Periodic, PeriodicAxis, Shape, Start, Wall};
 
     fn check(scene: &Scene) -> Result<(), DemError> {
         check_of(scene, 1)
@@ -234,6 +238,26 @@ mod tests {
         // Spheres of one clump are in each other as they are meant to be.
         scene.effects.clump.aspect = 1.5;
         scene.start = at(0.05);
+        check(&scene).unwrap();
+    }
+
+    #[test]
+    fn a_lattice_that_meets_itself_where_space_repeats_is_refused() {
+        let mut scene = Scene::drop(0.1);
+        scene.grains.count = 50;
+        let start = |along| {
+            let counts = [along, 5, 10];
+            Start::Grid { counts, spacing: 4.2e-3, jitter: 0.0, base: 2.5e-3 }
+        };
+        scene.periodic = Some(Periodic { axis: PeriodicAxis::X, from: -0.02, to: 0.02 });
+        scene.start = start(9);
+        check(&scene).unwrap();
+        // The tenth is 37.8 mm from the first, and 2.2 from where that comes again.
+        scene.start = start(10);
+        let text = check(&scene).unwrap_err().to_string();
+        assert!(text.starts_with("5 pair(s)") && text.contains("0 and 9"), "{text}");
+        // What is parted before it is let go needs room and no lattice.
+        scene.effects.polydispersity.cv = 0.1;
         check(&scene).unwrap();
     }
 
