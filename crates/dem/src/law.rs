@@ -26,6 +26,10 @@ const LAW_ACROSS_GAPS: u32 = 4;
 /// are parted first.
 const LAW_OF_PARTED: u32 = 5;
 
+/// The number of the law of grains with liquid bridges at walls of triangles, of whatever size and start: a bridge goes on
+/// where its grain passes from one triangle of a wall to the next.
+const LAW_OF_BRIDGES: u32 = 6;
+
 /// Whether grains that overlap where a scene starts them are parted before they are let go.
 pub(crate) fn is_parted(scene: &Scene) -> bool {
     scene.starts_crowded() && !scene.effects.clump.is_on()
@@ -33,6 +37,10 @@ pub(crate) fn is_parted(scene: &Scene) -> bool {
 
 /// Number of the law that pours of a scene follow.
 pub fn law_of(scene: &Scene) -> u32 {
+    let bridges = &scene.effects.capillary;
+    if bridges.is_on() && bridges.walls > 0.0 && has_facets(scene) {
+        return LAW_OF_BRIDGES;
+    }
     if is_parted(scene) {
         return LAW_OF_PARTED;
     }
@@ -44,6 +52,12 @@ pub fn law_of(scene: &Scene) -> u32 {
         return LAW_ACROSS_GAPS;
     }
     if scene.grains.radius() < LARGE { LAW_OF_SMALL } else { LAW }
+}
+
+/// Whether a scene has walls of triangles.
+fn has_facets(scene: &Scene) -> bool {
+    let is_of_them = |wall: &Wall| matches!(wall.shape, Shape::Box { .. } | Shape::Mesh(_));
+    scene.walls.iter().any(is_of_them) || scene.effects.outlet.is_on()
 }
 
 /// Number of the arithmetic that the law is worked out in, of pours of a scene.
@@ -82,10 +96,8 @@ pub fn arithmetic(scene: &Scene) -> u32 {
     let mut motions = motions.chain(scene.funnel.iter().map(|funnel| &funnel.motion));
     let meets_moving = solid.is_some() && motions.any(|motion| !motion.is_still());
     let meets_edges = solid.is_some() && !scene.walls.is_empty();
-    let Effects { clump, lubrication, polydispersity, outlet, .. } = &scene.effects;
-    let has_facets = |wall: &Wall| matches!(wall.shape, Shape::Box { .. } | Shape::Mesh(_));
-    let has_facets = scene.walls.iter().any(has_facets) || outlet.is_on();
-    let meets_facets = solid.is_some() && has_facets;
+    let Effects { clump, lubrication, polydispersity, .. } = &scene.effects;
+    let meets_facets = solid.is_some() && has_facets(scene);
     let solved_anew = [clump.is_on(), lubrication.is_on(), polydispersity.is_on()];
     let of_effects: u32 = solved_anew.map(u32::from).iter().sum();
     let of_shape = of_shape + u32::from(nutates || meets_moving);
@@ -251,6 +263,12 @@ mod tests {
         assert_eq!((law_of(&sand), small.slowness, small.impact_speed), (LAW_OF_SMALL, 0.5, 0.025));
         sand.effects.adhesion.bond = 1.0;
         assert_eq!(law_of(&sand), LAW_ACROSS_GAPS);
+        let mut wet = boxed.clone();
+        wet.grains.shape = None;
+        wet.effects.capillary.bond = 1.0;
+        assert_eq!(law_of(&wet), LAW_OF_BRIDGES);
+        wet.effects.capillary.walls = 0.0;
+        assert_eq!(law_of(&wet), LAW_ACROSS_GAPS);
         // At the substep of large grains nothing below 12 mm/s is an impact.
         let mut unequal = Scene::drop(0.1);
         assert_eq!(law_of(&unequal), LAW);

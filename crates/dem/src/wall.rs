@@ -221,6 +221,23 @@ impl Walls {
         end.is_some_and(|end| self.rims_at(owner, &end).any(Rim::is_free))
     }
 
+    /// Whether what joined a grain to a triangle of a wall is gone on with by another of the same wall, towards whose
+    /// `normal` the grain's centre lies at the begin of the substep: the nearest point has passed from the one to the other.
+    pub fn is_left_to(
+        &self,
+        left: usize,
+        surface: usize,
+        normal: &Vector3<f64>,
+        centre: &Vector3<f64>,
+    ) -> bool {
+        let ((owner, wall, number), (other, ..)) = (self.found(left), self.found(surface));
+        let Part::Triangle(facets, number) = wall.part(number) else { return false };
+        let stated = wall.stated() * normal;
+        left != surface
+            && owner == other
+            && facets.is_left_to(number, &stated, &wall.stated_place(centre, 0.0))
+    }
+
     /// The rims on the circle at which a surface of a wall ends.
     fn rims_at(&self, owner: usize, end: &(Vector3<f64>, f64)) -> impl Iterator<Item = &Rim> {
         // Walls that rest share their rims, one that moves has its own.

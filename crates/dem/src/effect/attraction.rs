@@ -22,6 +22,7 @@ use super::bridges::Bridges;
 use super::drag;
 use super::near::{self, Meeting, Near};
 use crate::particles::Particles;
+use crate::wall::Walls;
 
 /// What pulls in a scene.
 #[derive(Clone, Debug)]
@@ -68,7 +69,7 @@ impl Acts for Attraction {
     ) -> f64 {
         bridges.next.clear();
         let work = near::each(particles, context, |particles, near| {
-            let forces = self.forces(near, bridges);
+            let forces = self.forces(near, bridges, particles, context.walls);
             if !forces.iter().any(Force::is_on) {
                 return 0.0;
             }
@@ -169,7 +170,13 @@ impl Meeting {
 
 impl Attraction {
     /// The forces between two surfaces; keeps the bridge if there is one.
-    fn forces(&self, near: &Near, bridges: &mut Bridges) -> [Force<'_>; 2] {
+    fn forces(
+        &self,
+        near: &Near,
+        bridges: &mut Bridges,
+        particles: &Particles,
+        walls: &Walls,
+    ) -> [Force<'_>; 2] {
         let (gap, derjaguin) = (near.gap / self.radius, near.derjaguin / self.radius);
         let mut forces = [Force::None; 2];
         if let Some((adhesion, touch)) = &self.adhesion {
@@ -180,8 +187,9 @@ impl Attraction {
         }
         if let Some((capillary, touch)) = &self.capillary {
             let share = if near.is_wall { capillary.walls } else { 1.0 };
-            let holds =
-                gap < capillary.rupture() && bridges.joined.binary_search(&near.pair).is_ok();
+            let holds = gap < capillary.rupture()
+                && (bridges.joined.binary_search(&near.pair).is_ok()
+                    || near.is_wall && comes_over(near, bridges, particles, walls));
             if share > 0.0 && (gap <= TOUCH || holds) {
                 forces[1] = Force::Capillary(capillary, share * touch, derjaguin);
                 bridges.next.push(near.pair);
@@ -189,6 +197,17 @@ impl Attraction {
         }
         forces
     }
+}
+
+/// Whether a bridge to another triangle of the same wall has come over to this one.
+fn comes_over(near: &Near, bridges: &Bridges, particles: &Particles, walls: &Walls) -> bool {
+    let (grain, count) = (near.pair.0, particles.count() as u32);
+    let centre = particles.position(grain as usize);
+    let first = bridges.joined.partition_point(|pair| *pair < (grain, count));
+    let of_grain = bridges.joined[first..].iter().take_while(|pair| pair.0 == grain);
+    let surface_of = |pair: &(u32, u32)| (pair.1 - count) as usize;
+    let surface = surface_of(&near.pair);
+    of_grain.map(surface_of).any(|left| walls.is_left_to(left, surface, &near.normal, &centre))
 }
 
 /// Way in a substep below which a force is the same all along it, in radii `[-]`.

@@ -26,6 +26,9 @@ const ROUNDING: f64 = 1e-9;
 /// Triangles that bend by less than this at an edge lie flat there, as a sine `[-]`.
 const FLAT: f64 = 1e-3;
 
+/// Directions that are less than 60 degrees apart are one way, as a cosine `[-]`.
+const SAME_WAY: f64 = 0.5;
+
 /// The triangles of a mesh, in metres.
 #[derive(Clone, Debug)]
 pub(crate) struct Facets {
@@ -173,6 +176,17 @@ impl Facets {
         let height = offset.dot(&facet.normal);
         let side = if is_inside && height != 0.0 { height.signum() as i8 } else { 0 };
         Nearest { distance, normal, side, bends: !is_inside }
+    }
+
+    /// Whether what a triangle was to a place is gone on with by another, which lies towards `normal` of it: the place has
+    /// left the one, and the nearest point of either lies the same way.
+    pub fn is_left_to(&self, number: usize, normal: &Vector3<f64>, centre: &Vector3<f64>) -> bool {
+        if self.nearest(number, centre).distance.is_finite() {
+            return false;
+        }
+        let point = self.all[number].triangle.project_local_point(parry(centre), false).point;
+        let offset = centre - plain(point);
+        offset.dot(normal) > SAME_WAY * offset.norm()
     }
 
     /// The way from one place to another, if it goes through one triangle and ends behind an edge or a corner that the
