@@ -2,8 +2,8 @@
 //!
 //!     cargo run --release --example library
 //!
-//! In a crate of your own: `granulcal = { git = "https://github.com/granulcal/granulcal" }`, and `nalgebra` of the version in
-//! its Cargo.toml for vectors.
+//! In a crate of your own: `granulcal = { git = "https://github.com/granulcal/granulcal" }`, and `nalgebra` of the
+//! version in its Cargo.toml for vectors.
 
 use granulcal::dataset::{View, observe};
 use granulcal::dem::{Partner, Scene, Simulation};

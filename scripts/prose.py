@@ -1,4 +1,4 @@
-"""Holds lines of prose to 120 characters in every Markdown file that git tracks.
+"""Holds prose to 120 characters a line in every Markdown file and Rust comment that git tracks.
 
 `make lint` runs it. With `--wrap` it fills the paragraphs anew that have a longer line. Code,
 tables, formulas, headings and pictures may be longer. It needs only the standard library and git.
@@ -13,6 +13,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 LONGEST = 120
+COMMENT = re.compile(r"(\s*//[/!]?)(?: |$)")
 NO_PROSE = re.compile(r"\s*(\||\$\$|#|!\[[^\]]*\]\([^)]*\)$)| {4}")
 FENCE = re.compile(r"\s*(```|~~~)")
 # What begins a block of its own: a bullet, a number, a quotation.
@@ -25,22 +26,61 @@ def main() -> int:
     parser.add_argument("--wrap", action="store_true", help="fill the paragraphs anew")
     options = parser.parse_args()
     told = subprocess.run(
-        ["git", "ls-files", "-z", "*.md"], cwd=ROOT, check=True, capture_output=True, text=True
-    )
+        ["git", "ls-files", "-z", "*.md", "*.rs"],
+        cwd=ROOT, check=True, capture_output=True, text=True,
+    )  # fmt: skip
     found = 0
     for name in filter(None, told.stdout.split("\0")):
         path = ROOT / name
+        if not path.exists():
+            continue
         lines = path.read_text(encoding="utf-8").split("\n")
+        is_rust = path.suffix == ".rs"
         if options.wrap:
-            filled = wrapped(lines)
+            filled = wrapped_comments(lines) if is_rust else wrapped(lines)
             if filled != lines:
                 path.write_text("\n".join(filled), encoding="utf-8")
             lines = filled
-        for number in too_long(lines):
+        for number in long_comments(lines) if is_rust else too_long(lines):
             found += 1
             got = len(lines[number])
             print(f"{name}:{number + 1}: {got} characters of {LONGEST}", file=sys.stderr)
     return 1 if found else 0
+
+
+def comments(lines: list[str]) -> list[tuple[int, str, list[str]]]:
+    """Returns runs of comments of Rust: the first line, what every line begins with, the rest."""
+    found: list[tuple[int, str, list[str]]] = []
+    for number, line in enumerate(lines):
+        if not (begin := COMMENT.match(line)):
+            continue
+        text = line[begin.end() :]
+        if found and found[-1][0] + len(found[-1][2]) == number and found[-1][1] == begin[1]:
+            found[-1][2].append(text)
+        else:
+            found.append((number, begin[1], [text]))
+    return found
+
+
+def long_comments(lines: list[str]) -> list[int]:
+    """Returns the numbers of the lines of Rust whose comment is too long, from 0."""
+    return [
+        first + i
+        for first, begin, text in comments(lines)
+        for i in too_long(text, LONGEST - len(begin) - 1)
+    ]
+
+
+def wrapped_comments(lines: list[str]) -> list[str]:
+    """Returns the lines of Rust with the paragraphs of comments filled anew that are too long."""
+    for first, begin, text in reversed(comments(lines)):
+        filled = wrapped(text, LONGEST - len(begin) - 1)
+        lines = [
+            *lines[:first],
+            *(f"{begin} {line}".rstrip() for line in filled),
+            *lines[first + len(text) :],
+        ]
+    return lines
 
 
 def prose(lines: list[str]) -> list[bool]:
@@ -53,15 +93,15 @@ def prose(lines: list[str]) -> list[bool]:
     return is_prose
 
 
-def too_long(lines: list[str]) -> list[int]:
+def too_long(lines: list[str], longest: int = LONGEST) -> list[int]:
     """Returns the numbers of lines of prose that are too long, from 0."""
     is_prose = prose(lines)
-    return [i for i, line in enumerate(lines) if is_prose[i] and len(line) > LONGEST]
+    return [i for i, line in enumerate(lines) if is_prose[i] and len(line) > longest]
 
 
-def wrapped(lines: list[str]) -> list[str]:
+def wrapped(lines: list[str], longest: int = LONGEST) -> list[str]:
     """Returns the lines with every paragraph filled anew that has one that is too long."""
-    while long := too_long(lines):
+    while long := too_long(lines, longest):
         is_prose, first = prose(lines), long[0]
         while not BEGINS.match(lines[first]) and first > 0 and is_prose[first - 1]:
             first -= 1
@@ -73,7 +113,7 @@ def wrapped(lines: list[str]) -> list[str]:
         rest = begin if begin.strip() == ">" else " " * len(begin)
         text = " ".join(line.strip() for line in lines[first:last])[len(begin.lstrip()) :]
         filled = textwrap.wrap(
-            text, LONGEST, initial_indent=begin, subsequent_indent=rest,
+            text, longest, initial_indent=begin, subsequent_indent=rest,
             break_long_words=False, break_on_hyphens=False,
         )  # fmt: skip
         if filled == lines[first:last]:

@@ -1,8 +1,9 @@
 //! One frictionless impact with `rolling_dashpot`, against LIGGGHTS 3.8.0 with `epsd` and 0.7 of the critical dashpot
 //! (`python benches/peers/liggghts_impact.py`): the share of the rolling velocity that is kept at e 0.3.
 //!
-//! LIGGGHTS' contact is Hertz', whose stiffness grows with the overlap, ours a linear spring. LIGGGHTS' dashpot pulls, so
-//! that at this e its contact lasts 1.24 times as long, counted in the spring's rate: our dashpot is 0.7 x 1.24 = 0.87.
+//! LIGGGHTS' contact is Hertz', whose stiffness grows with the overlap, ours a linear spring. LIGGGHTS' dashpot pulls,
+//! so that at this e its contact lasts 1.24 times as long, counted in the spring's rate: our dashpot is 0.7 x 1.24 =
+//! 0.87.
 
 use granulcal::dem::{Material, Preset, Simulation, SolverSettings, Start};
 use nalgebra::Vector3;

@@ -1,5 +1,5 @@
-//! A pour of small grains is that of large ones, lengths in proportion and times like their roots: docs/theory/contact.md,
-//! "Small grains".
+//! A pour of small grains is that of large ones, lengths in proportion and times like their roots:
+//! docs/theory/contact.md, "Small grains".
 
 use granulcal::dem::{Scene, Simulation, Start, Status};
 

@@ -227,8 +227,8 @@ fn a_ball_that_falls_into_a_bed_leaves_a_crater() {
     let known = known * (fall + depth).cbrt();
     println!("crater: {:.1} mm deep, {:.1} mm by the law", 1e3 * depth, 1e3 * known);
     assert!((0.5..1.5).contains(&(depth / known)), "{depth} {known}");
-    // What it has pushed aside has not sunk: at this size the rim is 0.17 mm high in the mean of five seeds, with 0.25 mm
-    // from seed to seed, which one pour cannot show.
+    // What it has pushed aside has not sunk: at this size the rim is 0.17 mm high in the mean of five seeds, with 0.25
+    // mm from seed to seed, which one pour cannot show.
     let rim = level(bed, 0.014, 0.026) + 1.5e-3;
     println!("rim {:.2} mm above the bed", 1e3 * (rim - surface));
     assert!(rim > surface - 0.6e-3, "{rim} {surface}");

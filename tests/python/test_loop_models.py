@@ -13,6 +13,7 @@ from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.pours.forward import Coarse, Forward
 from granulcal.loop.report.interval import of_one_more, t_factor
 from granulcal.loop.report.models import Maker, Models, condition_of
+from granulcal.loop.report.models_of import scatter_of
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.pours.scene import Scene
 
@@ -242,3 +243,11 @@ def test_draws_of_few_pours_are_no_further_pours(pours: int, own: float) -> None
     held = np.mean((low <= another) & (another <= high))
     # As if all were of pours it had been 0.87 to 1.
     assert 0.89 < held < 0.95
+
+
+def test_the_scatter_of_one_pour_is_borrowed_where_nothing_tells_it() -> None:
+    # Written as NaN it left a `models.json` that `predict` could not read.
+    rows = [np.array([[1.0, 5.0], [3.0, 5.0]]), np.ones((1, 2)), np.empty((0, 2))]
+    spread = np.array([4.0, np.inf])
+    assert scatter_of(rows, spread) == pytest.approx(np.array([[np.sqrt(2.0), 0.0]] * 3))
+    assert scatter_of(rows[1:], spread) == pytest.approx(np.array([[4.0, 0.0]] * 2))

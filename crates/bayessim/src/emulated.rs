@@ -21,8 +21,8 @@ pub struct Emulated {
 }
 
 impl Emulated {
-    /// Of arrays named as in a model's file, of `statistics` statistics; `features` is the number of random frequencies,
-    /// if it is known.
+    /// Of arrays named as in a model's file, of `statistics` statistics; `features` is the number of random
+    /// frequencies, if it is known.
     ///
     /// # Errors
     /// [`ModelError::Content`] for an array that is missing, of another shape, or not finite.

@@ -1,8 +1,8 @@
 //! The shape of a density from weighted draws of it: normals around some of them, each as wide as the draws near it.
 //!
-//! Near is a window of covariance `h^2 / (1 - h^2) S` about the draw, S the covariance of all and h of Silverman's rule.
-//! Seen through it a normal of covariance S has `h^2 S`, the kernel of that rule; of several peaks each has what is its
-//! own, where kernels of the total covariance would be as wide as the peaks are apart.
+//! Near is a window of covariance `h^2 / (1 - h^2) S` about the draw, S the covariance of all and h of Silverman's
+//! rule. Seen through it a normal of covariance S has `h^2 S`, the kernel of that rule; of several peaks each has what
+//! is its own, where kernels of the total covariance would be as wide as the peaks are apart.
 
 use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector};
 

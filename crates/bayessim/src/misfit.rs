@@ -4,8 +4,8 @@
 //! smaller p-value of Q and max |r|, ranked among those of held-out pairs, is itself ranked among theirs. For several
 //! pours of one material the held-out residuals are bootstrapped: the share that pours have each for themselves is
 //! averaged over as many of them, the share that they have in common is taken from one, and what the emulator does not
-//! know of its means is drawn. Their scatter, `sum_ij (1 - s_j^2) (y_ij - mean_j)^2 / s_j^2`, is ranked as well: pours of two
-//! materials may have the mean of a third. `python/granulcal/bayessim/check/misfit.py` has the derivation.
+//! know of its means is drawn. Their scatter, `sum_ij (1 - s_j^2) (y_ij - mean_j)^2 / s_j^2`, is ranked as well: pours
+//! of two materials may have the mean of a third. `python/granulcal/bayessim/check/misfit.py` has the derivation.
 
 use std::fmt;
 
@@ -204,8 +204,8 @@ impl MisfitReference {
     }
 }
 
-/// Share of an axis' variance over the prior, 1, that its noise leaves to the parameters: where they do not show, pours of
-/// two materials differ no more than those of one.
+/// Share of an axis' variance over the prior, 1, that its noise leaves to the parameters: where they do not show, pours
+/// of two materials differ no more than those of one.
 fn signal(noise: f64) -> f64 {
     (1.0 - noise).max(0.0)
 }

@@ -1,7 +1,7 @@
 //! What is said of pixels at the edge of an image that are taken for grains.
 //!
-//! A thin frame of them is the camera's. A wide one is of grains that roll out of view: the simulated images have those,
-//! too, if they show as much of the ground.
+//! A thin frame of them is the camera's. A wide one is of grains that roll out of view: the simulated images have
+//! those, too, if they show as much of the ground.
 
 use granulcal_dataset::LEAST_SHOWN;
 use granulcal_features::Formation;
@@ -9,8 +9,8 @@ use granulcal_features::Formation;
 /// Widest frame that is the camera's and not the grains', over the image's shorter side `[-]`.
 const FRAME: f64 = 0.05;
 
-/// How many there are, and what leaves them out; none without any, or where they are grains as the simulated images show
-/// them.
+/// How many there are, and what leaves them out; none without any, or where they are grains as the simulated images
+/// show them.
 pub fn pixels_at_edge(formation: &Formation) -> Option<String> {
     let is_matched = formation.shown.is_some_and(|shown| shown > LEAST_SHOWN);
     if is_matched && formation.is_cropped {
@@ -30,8 +30,8 @@ pub fn pixels_at_edge(formation: &Formation) -> Option<String> {
     (!is_matched).then(|| format!("{what}: others may have rolled out of view"))
 }
 
-/// What leaves out a thin frame of so many pixels. Images of a scene, as wide as these, have grains that rolled to their
-/// edge, too, and a model has learnt from those.
+/// What leaves out a thin frame of so many pixels. Images of a scene, as wide as these, have grains that rolled to
+/// their edge, too, and a model has learnt from those.
 fn advice(frame: usize, is_matched: bool) -> String {
     let leaves = format!("--border {frame} leaves them out");
     if is_matched {

@@ -169,8 +169,8 @@ fn asked() {
     }
 }
 
-/// Does the same for every byte of such a signal that is read from a pipe, until it is closed: Python writes the numbers
-/// of signals into one as soon as they come, whatever the interpreter is busy with.
+/// Does the same for every byte of such a signal that is read from a pipe, until it is closed: Python writes the
+/// numbers of signals into one as soon as they come, whatever the interpreter is busy with.
 ///
 /// What comes after the returned command is dropped is not heard.
 ///

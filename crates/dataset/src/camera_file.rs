@@ -195,6 +195,7 @@ pub(crate) fn camera_of(intrinsics: Intrinsics) -> Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use granulcal_features::Threshold;
 
     #[test]
     fn a_camera_that_somebody_changed_is_not_replaced() {
@@ -239,6 +240,33 @@ mod tests {
             let by_hand = CameraFile { depth_unit: Some(unit), ..file.clone() };
             let error = by_hand.lens_and_unit(Path::new("c.toml")).unwrap_err().to_string();
             assert!(error.contains("depth_unit must be positive and finite"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_threshold_is_a_height_or_a_table() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("c.toml");
+        let of = |value: &str| {
+            let text = format!("[segmentation]\nheight_threshold = {value}\n");
+            std::fs::write(&path, text).unwrap();
+            CameraFile::load(&path).map(|file| file.segmentation.height_threshold)
+        };
+        assert_eq!(of("0.0013").unwrap(), Threshold::Absolute(0.0013));
+        assert_eq!(of("1").unwrap(), Threshold::Absolute(1.0));
+        assert_eq!(of("{ absolute = 0.002 }").unwrap(), Threshold::Absolute(0.002));
+        let automatic = of("{ automatic = { floor = 0.003 } }").unwrap();
+        assert_eq!(automatic, Threshold::Automatic { floor: 0.003 });
+        for (wrong, said) in [
+            ("\"2 mm\"", "a height in m, { absolute = 0.002 }"),
+            ("{ fixed = 0.002 }", "absolute"),
+            ("{ automatic = { least = 1 } }", "floor"),
+            ("{ automatic = 0.003 }", "Automatic"),
+        ] {
+            let error = of(wrong).unwrap_err();
+            assert!(error.to_string().contains("c.toml"), "{error}");
+            let why = std::error::Error::source(&error).unwrap().to_string();
+            assert!(why.contains(said), "{wrong}: {why}");
         }
     }
 }

@@ -108,8 +108,8 @@ pub fn look(
     Folder::look(out, &accepted(None, scene, prior, options)?, options)
 }
 
-/// What the rows of a batch are of, once it is known that all of them can be begun: a batch that ends at a draw cannot go
-/// on with another prior.
+/// What the rows of a batch are of, once it is known that all of them can be begun: a batch that ends at a draw cannot
+/// go on with another prior.
 fn accepted(
     engine: Option<&Engine>,
     scene: &granulcal_dem::Scene,

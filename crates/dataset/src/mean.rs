@@ -32,8 +32,8 @@ const ALONG: usize = 30;
 /// Least side of a block `[px]`.
 const LEAST_SIDE: usize = 4;
 /// Blocks of one view, but for a few, differ by less than so many metres, or robust standard deviations of what all
-/// blocks of the image do: that is the camera's noise, which grows with the square of the depth. Two frames of a D435 at
-/// 1.5 m have 2 of 1142 blocks beyond, another pour of 2000 grains at 0.3 m has 125 of 900.
+/// blocks of the image do: that is the camera's noise, which grows with the square of the depth. Two frames of a D435
+/// at 1.5 m have 2 of 1142 blocks beyond, another pour of 2000 grains at 0.3 m has 125 of 900.
 const OFF: f64 = 1e-3;
 const DEVIATIONS: f64 = 6.0;
 const FEW: usize = 4;
@@ -117,8 +117,8 @@ impl Mean {
         Ok(())
     }
 
-    /// How many blocks of an image are off the mean of those before by more than noise explains, at the pixels that both
-    /// know.
+    /// How many blocks of an image are off the mean of those before by more than noise explains, at the pixels that
+    /// both know.
     fn blocks_off(&self, values: &Values) -> usize {
         let side = (self.width.min(self.height) / ALONG).max(LEAST_SIDE);
         let across = self.width.div_ceil(side);

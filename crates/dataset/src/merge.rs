@@ -1,8 +1,8 @@
 //! Data sets of several machines to one file, of which only as much is in memory as is being joined.
 //!
-//! A *source* is a Parquet file: a part of a folder, or a file that was given. Sources are opened when the rows have come
-//! to their first one, and closed after their last, so that of folders there are some parts in memory, of the file some
-//! thousand rows, and of a given file all of it.
+//! A *source* is a Parquet file: a part of a folder, or a file that was given. Sources are opened when the rows have
+//! come to their first one, and closed after their last, so that of folders there are some parts in memory, of the file
+//! some thousand rows, and of a given file all of it.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -35,8 +35,8 @@ pub struct Merged {
 }
 
 /// Joins data sets of one scene, prior, seed and version, for example the shards of several machines, into one Parquet
-/// file, in order of the rows; names at most `named_gaps` rows that are missing. A row that stands in several of them is
-/// written once.
+/// file, in order of the rows; names at most `named_gaps` rows that are missing. A row that stands in several of them
+/// is written once.
 ///
 /// # Errors
 /// [`DatasetError::Differs`] names the first difference, [`DatasetError::DuplicateRow`] a row that is another in two of

@@ -146,8 +146,8 @@ impl Observer {
         has_ended.then(|| simulation.into_pour())
     }
 
-    /// Simulates to the substep that ends nearest to `time` `[s]`, or less if the pour ends before, and takes the samples
-    /// that fall due. Gives up between two substeps when `keep_going` says so: false then.
+    /// Simulates to the substep that ends nearest to `time` `[s]`, or less if the pour ends before, and takes the
+    /// samples that fall due. Gives up between two substeps when `keep_going` says so: false then.
     pub fn advance_while(
         &mut self,
         simulation: &mut Simulation,

@@ -1,8 +1,8 @@
 //! Whether a recording can be of a scene at all, before its statistics are asked anything: a room is no pile.
 //!
 //! The bounds are wide, so that no formation of the scene is beyond them, whatever its material: grains end no higher
-//! than they began and no lower than one lies, take no more room than grains can and, where none is out of view, no less
-//! than they are, lie where the camera looks, on a ground that is flat.
+//! than they began and no lower than one lies, take no more room than grains can and, where none is out of view, no
+//! less than they are, lie where the camera looks, on a ground that is flat.
 
 use granulcal_dem::Simulation;
 use granulcal_features::Formation;
@@ -20,8 +20,8 @@ pub use doubts::{LEAST_SHOWN, UNIT_FACTOR};
 const HEIGHT_MARGIN: f64 = 1.5;
 /// Room that grains take over their own volume: twice in the loosest heap, and twice for what hides under a pixel.
 const VOLUME_MARGIN: f64 = 4.0;
-/// Room that grains take over their own volume, at least: they take 1.27 to 1.55 times as much in heaps and single layers
-/// of 2000, and of 60 grains that lie apart, which a coarse image samples, 0.88 to 1.27.
+/// Room that grains take over their own volume, at least: they take 1.27 to 1.55 times as much in heaps and single
+/// layers of 2000, and of 60 grains that lie apart, which a coarse image samples, 0.88 to 1.27.
 const LEAST_VOLUME: f64 = 0.7;
 /// Height of the highest grain over the diameter of the least, at least.
 const LEAST_HEIGHT: f64 = 0.5;
@@ -29,8 +29,8 @@ const LEAST_HEIGHT: f64 = 0.5;
 /// none out of view: of 60 pours of the default prior each that had came within 0.06 of it, or held less than 0.05.
 const WITHIN: f64 = 0.2;
 const LEFT_OVER: f64 = 0.2;
-/// Share of the formation's outline beyond which nothing is seen, above which that is said. A stereo camera's shadows at
-/// its foot stay below.
+/// Share of the formation's outline beyond which nothing is seen, above which that is said. A stereo camera's shadows
+/// at its foot stay below.
 const HIDDEN: f64 = 0.1;
 /// Factor beyond what a scene allows, above which a unit is asked for: millimetres are 1000 times as many as metres.
 const MUCH: f64 = 30.0;

@@ -45,7 +45,8 @@ pub fn readable(text: &str) -> Cow<'_, str> {
 }
 
 /// What is wrong with the TOML of a `what` in the file at `path`. Of a file that is not called TOML no line is quoted:
-/// somebody's task may name a scene that is another user's file. Of a link the name of the file counts that it leads to.
+/// somebody's task may name a scene that is another user's file. Of a link the name of the file counts that it leads
+/// to.
 pub(crate) fn toml_error(
     path: &Path,
     what: &'static str,

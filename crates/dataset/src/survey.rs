@@ -17,7 +17,8 @@ use crate::input::{Input, ReadSeek};
 use crate::message::{self, Kind, Lens, PictureFacts};
 use crate::message_file::{Channel, Damage, Message, MessageFormat, Walk, walk};
 
-/// Stamp of what a RealSense's software writes once and for all times, as its lens and depth unit: the least time of ROS 1.
+/// Stamp of what a RealSense's software writes once and for all times, as its lens and depth unit: the least time of
+/// ROS 1.
 const STATIC_NS: u64 = 1;
 
 /// The topics of a recording, and what is wrong with the file.

@@ -11,8 +11,8 @@ use crate::{DatasetError, Observer, Room};
 /// What a pour costs that was made, or begun.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {
-    /// Processor time of the whole pour `[s]`; of one that was cut short what it would be if it lasted until its horizon
-    /// at the pace of the last half of the trial.
+    /// Processor time of the whole pour `[s]`; of one that was cut short what it would be if it lasted until its
+    /// horizon at the pace of the last half of the trial.
     pub cpu_s: f64,
     /// Simulated time `[s]`.
     pub reached_s: f64,
@@ -58,7 +58,8 @@ pub fn try_pour(
     }
 }
 
-/// Processor time until the horizon `[s]`, at the pace since `middle`; both are processor time and simulated time `[s]`.
+/// Processor time until the horizon `[s]`, at the pace since `middle`; both are processor time and simulated time
+/// `[s]`.
 fn to_horizon((cpu_s, reached_s): (f64, f64), middle: (f64, f64), horizon: f64) -> f64 {
     let pace = (cpu_s - middle.0) / (reached_s - middle.1);
     cpu_s + pace * (horizon - reached_s).max(0.0)

@@ -181,8 +181,8 @@ fn empty_lanes_open<W: Width>(batch: &Batch, gap: Reg<W>) -> Reg<W> {
     Reg::load(&gaps)
 }
 
-/// How much farther from each other two centres are after a time, for they pass each other, than along their first normal
-/// `[m]`: `d' - d - w_n time` with their distance `d'` then, to second order `w_t^2 time^2 / (2 d)`.
+/// How much farther from each other two centres are after a time, for they pass each other, than along their first
+/// normal `[m]`: `d' - d - w_n time` with their distance `d'` then, to second order `w_t^2 time^2 / (2 d)`.
 #[inline(always)]
 fn passing<W: Width>(distance: Reg<W>, dv: Reg3<W>, w_n: Reg<W>, time: Reg<W>) -> Reg<W> {
     let (zero, two) = (Reg::splat(0.0), Reg::splat(2.0));

@@ -35,7 +35,8 @@ pub(crate) struct Blocks {
 }
 
 impl Blocks {
-    /// Puts grains at `points` `[m]` into blocks; no pair is longer than `longest` `[m]`, but for those of `wide` grains.
+    /// Puts grains at `points` `[m]` into blocks; no pair is longer than `longest` `[m]`, but for those of `wide`
+    /// grains.
     pub fn place(&mut self, points: &[Vector3<f64>], longest: f64, radius: f64, wide: &[u32]) {
         self.of.clear();
         self.has_wide = !wide.is_empty();
@@ -95,8 +96,8 @@ impl Blocks {
         one.into_iter().chain(several.iter().cloned())
     }
 
-    /// Orders the contacts by their blocks and leaves their order within a block; returns where each begins. Whether they
-    /// are pairs says what their partners are.
+    /// Orders the contacts by their blocks and leaves their order within a block; returns where each begins. Whether
+    /// they are pairs says what their partners are.
     pub fn sort(
         &self,
         listed: &[ContactKey],

@@ -5,12 +5,12 @@
 //! ```
 //!
 //! S is the gap, S_min the least that it has been since the pair was joined, and s how far its surfaces have slid past
-//! each other. With a steady pull among the forces a contact opens where it is drawn by more than F, and is sheared against
-//! mu (lambda_n + F).
+//! each other. With a steady pull among the forces a contact opens where it is drawn by more than F, and is sheared
+//! against mu (lambda_n + F).
 //!
-//! In a substep the impulse F dt acts right after the impacts, at their time, and before the contact solve. Of a bond that
-//! breaks within the substep what takes the energy that is left of F range acts, so that parting costs the same at any
-//! speed.
+//! In a substep the impulse F dt acts right after the impacts, at their time, and before the contact solve. Of a bond
+//! that breaks within the substep what takes the energy that is left of F range acts, so that parting costs the same at
+//! any speed.
 
 use granulcal_scene::{Effect, Scene};
 use nalgebra::Vector3;

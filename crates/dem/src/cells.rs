@@ -8,8 +8,8 @@ const MOST_CELLS: u64 = 1 << 21;
 const MARGIN: u64 = 8;
 
 /// Gives each pair of places, the lower number first, that are no farther from each other than `base` and what both are
-/// allowed. Cells are as wide as `slow`, in which all are found of those that are allowed little; and are sorted: a row of
-/// them along z is one range.
+/// allowed. Cells are as wide as `slow`, in which all are found of those that are allowed little; and are sorted: a row
+/// of them along z is one range.
 pub(crate) fn pairs_within(
     centres: &[Vector3<f64>],
     allowed: &[f64],

@@ -90,8 +90,8 @@ impl Acting {
         self.effects.iter().fold(restitution, |e, effect| effect.restitution_at(e, speed))
     }
 
-    /// Lets act what does so before gravity: what it finds is how grains move, not how they would fall; returns the work
-    /// of moving walls, per typical mass `[m^2/s^2]`.
+    /// Lets act what does so before gravity: what it finds is how grains move, not how they would fall; returns the
+    /// work of moving walls, per typical mass `[m^2/s^2]`.
     pub fn act_before_gravity(
         &self,
         particles: &mut Particles,

@@ -1,7 +1,7 @@
 //! Mechanical energy per typical mass, at the end of a substep.
 //!
-//! Velocities are those of the middle of the substep before, so that the kinetic energy at the time of the places is that
-//! of `v + g dt / 2`: a free flight then changes nothing, nor does a bounce that gives all back.
+//! Velocities are those of the middle of the substep before, so that the kinetic energy at the time of the places is
+//! that of `v + g dt / 2`: a free flight then changes nothing, nor does a bounce that gives all back.
 
 use nalgebra::Vector3;
 

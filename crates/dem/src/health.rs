@@ -18,8 +18,8 @@ pub struct Health {
     /// Worst natural-map residual over rms normal impulse of the sampled substeps `[-]`.
     pub worst_residual: f64,
     /// Largest rise of mechanical energy above its lowest value so far `[-]`, over what the start had above the lowest
-    /// point that a grain has come to, or over what lifts every grain by its radius and sets it in motion as the end rule sees
-    /// it, if that is more.
+    /// point that a grain has come to, or over what lifts every grain by its radius and sets it in motion as the end
+    /// rule sees it, if that is more.
     pub energy_created: f64,
     /// Grains whose centre passed through a wall; must be 0.
     pub grains_lost: usize,

@@ -22,12 +22,12 @@ const LAW_OF_SMALL: u32 = 3;
 /// with the grains of every start.
 const LAW_ACROSS_GAPS: u32 = 4;
 
-/// The number of the law of unequal grains that start where equal ones would just fit, of whatever size and effects: they
-/// are parted first.
+/// The number of the law of unequal grains that start where equal ones would just fit, of whatever size and effects:
+/// they are parted first.
 const LAW_OF_PARTED: u32 = 5;
 
-/// The number of the law of grains with liquid bridges at walls of triangles, of whatever size and start: a bridge goes on
-/// where its grain passes from one triangle of a wall to the next.
+/// The number of the law of grains with liquid bridges at walls of triangles, of whatever size and start: a bridge goes
+/// on where its grain passes from one triangle of a wall to the next.
 const LAW_OF_BRIDGES: u32 = 6;
 
 /// Whether grains that overlap where a scene starts them are parted before they are let go.
@@ -63,26 +63,26 @@ fn has_facets(scene: &Scene) -> bool {
 /// Number of the arithmetic that the law is worked out in, of pours of a scene.
 ///
 /// It counts up whenever such a pour changes by its rounding or the order of its contacts alone: the same seed is then
-/// another pour of the same law. Data sets and checkpoints state it, so that a batch is not gone on with by another; what
-/// is learned from pours does not depend on it. 1 is double precision throughout; grains with a shape came to 2 when
-/// their points were swept eight at a time, and to 3 when walls were foreseen and cores told how bodies lie; boxes came to
-/// 4 when their separating axes were tried by the crate itself. Boxes came to 5 and the others to 4 when what is foreseen
-/// was looked at where a way leads elsewhere, and boxes met eight pairs at a time; to 6 and 5 when a corner that has gone
-/// round the end of a shell was no longer taken for one that has come through it. Cylinders came to 6 when their nearest
-/// points were those of their features. Boxes and cylinders came to 7 and the others to 6 when an overlap that is
-/// foreseen, no deeper than sweeps may leave a point, was no point of contact yet; to 8 and 7 when corners that go through
-/// a shell were foreseen as those that go through a plane. Bodies and clumps that nutate came one farther when they turned
-/// in parts of a substep, and bodies where walls move when those were looked at where they go; bodies in scenes with walls of
-/// their own when corners that go through the edge where two sides meet were found, and those at boxes, meshes and other
-/// outlets than round ones once more when they touched the edges of triangles and went round them. All bodies came one
-/// farther when points that are open were swept apart from those that push, and balls and clumps when pairs that pass each
-/// other were seen as far apart as they are at the end of a substep. Bodies came one farther again when they met where they
-/// lie at that time, and once more when two that are known to meet, and ways that lead into the same by more, were
-/// looked at no more; they came one farther still when points that hardly change in a sweep were swept less often and
-/// small turns went by their series. Balls with a film between them came to 2 when Newton's steps told what it leaves of a
-/// speed, and clumps to 3 when the ends of their ways were looked at. Unequal balls came to 2 when contacts were solved to
-/// the least of them, and those that are parted to 3 when none went through a wall for it, and they were parted across the
-/// ends of a period.
+/// another pour of the same law. Data sets and checkpoints state it, so that a batch is not gone on with by another;
+/// what is learned from pours does not depend on it. 1 is double precision throughout; grains with a shape came to 2
+/// when their points were swept eight at a time, and to 3 when walls were foreseen and cores told how bodies lie; boxes
+/// came to 4 when their separating axes were tried by the crate itself. Boxes came to 5 and the others to 4 when what
+/// is foreseen was looked at where a way leads elsewhere, and boxes met eight pairs at a time; to 6 and 5 when a corner
+/// that has gone round the end of a shell was no longer taken for one that has come through it. Cylinders came to 6
+/// when their nearest points were those of their features. Boxes and cylinders came to 7 and the others to 6 when an
+/// overlap that is foreseen, no deeper than sweeps may leave a point, was no point of contact yet; to 8 and 7 when
+/// corners that go through a shell were foreseen as those that go through a plane. Bodies and clumps that nutate came
+/// one farther when they turned in parts of a substep, and bodies where walls move when those were looked at where they
+/// go; bodies in scenes with walls of their own when corners that go through the edge where two sides meet were found,
+/// and those at boxes, meshes and other outlets than round ones once more when they touched the edges of triangles and
+/// went round them. All bodies came one farther when points that are open were swept apart from those that push, and
+/// balls and clumps when pairs that pass each other were seen as far apart as they are at the end of a substep. Bodies
+/// came one farther again when they met where they lie at that time, and once more when two that are known to meet, and
+/// ways that lead into the same by more, were looked at no more; they came one farther still when points that hardly
+/// change in a sweep were swept less often and small turns went by their series. Balls with a film between them came to
+/// 2 when Newton's steps told what it leaves of a speed, and clumps to 3 when the ends of their ways were looked at.
+/// Unequal balls came to 2 when contacts were solved to the least of them, and those that are parted to 3 when none
+/// went through a wall for it, and they were parted across the ends of a period.
 pub fn arithmetic(scene: &Scene) -> u32 {
     let of_shape = match scene.grains.shape {
         Some(GrainShape::Box { .. } | GrainShape::Cylinder { .. }) => 12,
@@ -123,8 +123,8 @@ pub(crate) struct Small {
     pub slop: f64,
     /// Fastest correction of a penetration `[m/s]`.
     pub correction_speed: f64,
-    /// Fastest way out `[m/s]` that is asked of a contact whose grains have parted in an impact and are pressed together
-    /// again in the same substep.
+    /// Fastest way out `[m/s]` that is asked of a contact whose grains have parted in an impact and are pressed
+    /// together again in the same substep.
     pub pinned_speed: f64,
     /// Approach below which an impact is inelastic `[m/s]`: a matter of the contact solve, not of `impact`.
     pub impact_speed: f64,

@@ -33,8 +33,8 @@
 //! # Ok::<(), granulcal_dem::DemError>(())
 //! ```
 //!
-//! Vectors are those of `nalgebra`, which a program of its own depends on, too. Read [`Scene`], then [`Simulation`]; the
-//! law is in `law.rs`, the solvers in `solver/`.
+//! Vectors are those of `nalgebra`, which a program of its own depends on, too. Read [`Scene`], then [`Simulation`];
+//! the law is in `law.rs`, the solvers in `solver/`.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|

@@ -5,15 +5,16 @@
 //! rho_f q du/dt = ... + sum of w k (v.e_r - u) over an area
 //! ```
 //!
-//! The liquid is a sheet about the z axis (`liquid/flow.rs`) with a surface h(r) and a velocity u outwards. A grain feels
-//! it with the share w of its volume that is below that surface: buoyancy, the pressure that accelerates the liquid there
-//! by a_p, half of what it displaces as added mass, and Di Felice's drag in a packing (`effect/drag.rs`, which is Ergun's
-//! within a third) over `permeability`. What the drag gives to a grain it takes from the liquid, radially; up and around
-//! the liquid goes with the grain's neighbours `<v>`, the ground among them. Drag is implicit (`liquid/drag.rs`).
+//! The liquid is a sheet about the z axis (`liquid/flow.rs`) with a surface h(r) and a velocity u outwards. A grain
+//! feels it with the share w of its volume that is below that surface: buoyancy, the pressure that accelerates the
+//! liquid there by a_p, half of what it displaces as added mass, and Di Felice's drag in a packing (`effect/drag.rs`,
+//! which is Ergun's within a third) over `permeability`. What the drag gives to a grain it takes from the liquid,
+//! radially; up and around the liquid goes with the grain's neighbours `<v>`, the ground among them. Drag is implicit
+//! (`liquid/drag.rs`).
 //!
-//! Source: two phases, each with its momentum, averaged over the depth: Pitman and Le, Phil. Trans. R. Soc. A 363 (2005)
-//! 1573, doi:10.1098/rsta.2005.1596; slip of water and grains in a collapse: Meng et al., J. Fluid Mech. 943 (2022) A19,
-//! doi:10.1017/jfm.2022.400.
+//! Source: two phases, each with its momentum, averaged over the depth: Pitman and Le, Phil. Trans. R. Soc. A 363
+//! (2005) 1573, doi:10.1098/rsta.2005.1596; slip of water and grains in a collapse: Meng et al., J. Fluid Mech. 943
+//! (2022) A19, doi:10.1017/jfm.2022.400.
 
 mod drag;
 mod flow;
@@ -208,8 +209,8 @@ fn dragged_one(
     }
 }
 
-/// Drags a grain up and around with its neighbours and takes its spin; returns the rate at which it is dragged outwards,
-/// where the liquid has the velocity `speed`.
+/// Drags a grain up and around with its neighbours and takes its spin; returns the rate at which it is dragged
+/// outwards, where the liquid has the velocity `speed`.
 fn beside(
     particles: &mut Particles,
     grain: usize,
@@ -229,7 +230,8 @@ fn beside(
     share * linear
 }
 
-/// Squares of a grain's velocity along each axis: what falls on something that holds it takes nothing from what goes along.
+/// Squares of a grain's velocity along each axis: what falls on something that holds it takes nothing from what goes
+/// along.
 struct Along(Vector3<f64>);
 
 impl Along {
@@ -260,8 +262,8 @@ impl Sheet {
         Self { ring: flow.ring, crowds: crowds.collect(), heights }
     }
 
-    /// How crowded a grain is: the solids in its ring over those of a packing up to the surface, which a layer of grains on
-    /// the ground has and its neighbours do not tell.
+    /// How crowded a grain is: the solids in its ring over those of a packing up to the surface, which a layer of
+    /// grains on the ground has and its neighbours do not tell.
     fn crowd(&self, particles: &Particles, grain: usize) -> f64 {
         self.between(&self.crowds, from_axis(&particles.position(grain)).0)
     }

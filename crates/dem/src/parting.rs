@@ -1,8 +1,8 @@
 //! Grains of different size on a lattice that is as wide as grains of one size need: parted before the pour begins.
 //!
-//! While any two overlap, each pair that does is moved apart along the line between its centres, either grain by half of
-//! it, in the order of their numbers (Gauss and Seidel's rounds of position-based dynamics; Müller et al. 2007), and what
-//! is in a wall is moved out of it: docs/theory/effects.md, polydispersity.
+//! While any two overlap, each pair that does is moved apart along the line between its centres, either grain by half
+//! of it, in the order of their numbers (Gauss and Seidel's rounds of position-based dynamics; Müller et al. 2007), and
+//! what is in a wall is moved out of it: docs/theory/effects.md, polydispersity.
 
 use nalgebra::Vector3;
 
@@ -20,8 +20,8 @@ const SKIN: f64 = 0.4;
 /// Rounds at most: what a closed container has no room for is left to the pour.
 const ROUNDS: usize = 10_000;
 
-/// Parts spheres that overlap each other, across the ends of a period too, or a wall; none goes through a wall. Those that
-/// hang in the air keep the height of their lowest point.
+/// Parts spheres that overlap each other, across the ends of a period too, or a wall; none goes through a wall. Those
+/// that hang in the air keep the height of their lowest point.
 pub(crate) fn part(spheres: &mut [Row], walls: &Walls, period: Option<Period>, hangs: bool) {
     let mut places = Places::of(spheres, period);
     let floor = places.lowest();

@@ -91,8 +91,8 @@ pub struct BedAtRest {
 }
 
 /// Grains that are convex bodies of one shape: an intersection of half spaces, and of a cylinder about the y axis if it
-/// is round. The axes of a box are along its edges, in the order in which the scene states them; of a superquadric and a
-/// hull they are the principal ones, which [`Solid::axes`] has in the shape as it is stated.
+/// is round. The axes of a box are along its edges, in the order in which the scene states them; of a superquadric and
+/// a hull they are the principal ones, which [`Solid::axes`] has in the shape as it is stated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConvexGrains {
     /// Outward unit normals and distances from the centre of mass of the flat faces, in the body's axes `[m]`.

@@ -78,8 +78,8 @@ struct Origin {
 }
 
 impl Simulation {
-    /// Puts the grains of `scene` at their start; the seed moves them within the start's jitter. Grains that begin in each
-    /// other or in a wall are taken as they are: [`Simulation::check_start`] refuses them.
+    /// Puts the grains of `scene` at their start; the seed moves them within the start's jitter. Grains that begin in
+    /// each other or in a wall are taken as they are: [`Simulation::check_start`] refuses them.
     ///
     /// # Errors
     /// What [`Scene::check`] says.
@@ -165,15 +165,15 @@ impl Simulation {
         self.substep as f64 * self.around.settings.dt
     }
 
-    /// The number that each grain had at the start, from 0, of those that have not left the scene: what stands at one place
-    /// of [`Simulation::positions`], velocities and radii is of this grain, however many have left before it. Of grains
-    /// that are several spheres these are all spheres, of one grain after the other.
+    /// The number that each grain had at the start, from 0, of those that have not left the scene: what stands at one
+    /// place of [`Simulation::positions`], velocities and radii is of this grain, however many have left before it. Of
+    /// grains that are several spheres these are all spheres, of one grain after the other.
     pub fn numbers(&self) -> Vec<usize> {
         self.particles.present().collect()
     }
 
-    /// Centres of the grains `[m]`, of their spheres where they are several; as velocities and radii, of those that have
-    /// not left the scene. [`Simulation::numbers`] tells which they are.
+    /// Centres of the grains `[m]`, of their spheres where they are several; as velocities and radii, of those that
+    /// have not left the scene. [`Simulation::numbers`] tells which they are.
     pub fn positions(&self) -> Vec<Vector3<f64>> {
         self.particles.present().map(|grain| self.particles.position(grain)).collect()
     }
@@ -193,8 +193,8 @@ impl Simulation {
         self.particles.present().map(|grain| self.particles.radius(grain)).collect()
     }
 
-    /// Radii of all grains of the scene by their number at the start `[m]`: also of those that have left it, or are still to
-    /// enter it, as an intruder, which is the last.
+    /// Radii of all grains of the scene by their number at the start `[m]`: also of those that have left it, or are
+    /// still to enter it, as an intruder, which is the last.
     pub fn all_radii(&self) -> Vec<f64> {
         (0..self.particles.count()).map(|grain| self.particles.radius(grain)).collect()
     }
@@ -305,9 +305,9 @@ impl Simulation {
         self.impacts.work
     }
 
-    /// Simulates `seconds`, rounded to whole substeps, or less if the pour ends before; to its end for infinity. Nothing
-    /// is simulated for less than half a substep, nor for a negative number or NaN. Returns how the pour ended, once it
-    /// has: from then on no call simulates anything. Each call rounds by itself; see [`Self::advance_to`].
+    /// Simulates `seconds`, rounded to whole substeps, or less if the pour ends before; to its end for infinity.
+    /// Nothing is simulated for less than half a substep, nor for a negative number or NaN. Returns how the pour ended,
+    /// once it has: from then on no call simulates anything. Each call rounds by itself; see [`Self::advance_to`].
     pub fn advance(&mut self, seconds: f64) -> Option<Status> {
         self.advance_by(self.substeps(seconds))
     }

@@ -42,8 +42,8 @@ pub(crate) fn nutates(moments: &Vector3<f64>) -> bool {
     unlikeness(moments) > ALIKE
 }
 
-/// The turn about a vector by its length `[rad]`, by the series of `cos x` and `sin x / x` of half the angle x where that is
-/// small: the first term that is left out is below 1e-17.
+/// The turn about a vector by its length `[rad]`, by the series of `cos x` and `sin x / x` of half the angle x where
+/// that is small: the first term that is left out is below 1e-17.
 pub(crate) fn turn_by(vector: &Vector3<f64>) -> UnitQuaternion<f64> {
     let square = 0.25 * vector.norm_squared();
     if square > SMALL * SMALL {
@@ -55,8 +55,8 @@ pub(crate) fn turn_by(vector: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::new_unchecked(Quaternion::from_parts(cos, 0.5 * sin * vector))
 }
 
-/// How a body is turned after `dt` `[s]`: with these moments of inertia, the angular momentum L, and the angular velocity
-/// omega at the begin `[rad/s]`; `twist` is by how much impacts turn it besides `[rad]`.
+/// How a body is turned after `dt` `[s]`: with these moments of inertia, the angular momentum L, and the angular
+/// velocity omega at the begin `[rad/s]`; `twist` is by how much impacts turn it besides `[rad]`.
 pub(crate) fn turned_on(
     from: &UnitQuaternion<f64>,
     moments: &Vector3<f64>,

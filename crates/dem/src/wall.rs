@@ -205,8 +205,8 @@ impl Walls {
         self.all.iter().map(of).fold(0.0, f64::max)
     }
 
-    /// Whether the way from one place to another, at `now` `[s]` into a substep, changes the side of a surface round an end
-    /// at which nothing goes on. Of triangles [`Self::way`] tells it.
+    /// Whether the way from one place to another, at `now` `[s]` into a substep, changes the side of a surface round an
+    /// end at which nothing goes on. Of triangles [`Self::way`] tells it.
     pub fn leads_round(
         &self,
         surface: usize,
@@ -222,7 +222,8 @@ impl Walls {
     }
 
     /// Whether what joined a grain to a triangle of a wall is gone on with by another of the same wall, towards whose
-    /// `normal` the grain's centre lies at the begin of the substep: the nearest point has passed from the one to the other.
+    /// `normal` the grain's centre lies at the begin of the substep: the nearest point has passed from the one to the
+    /// other.
     pub fn is_left_to(
         &self,
         left: usize,
@@ -247,8 +248,8 @@ impl Walls {
         rims.filter(move |rim| is_same_circle(&(rim.centre, rim.radius), end))
     }
 
-    /// The way from one place to another, at `now` `[s]` into a substep, if it goes through a surface and ends behind the
-    /// edge where that meets another, beyond the ends of both.
+    /// The way from one place to another, at `now` `[s]` into a substep, if it goes through a surface and ends behind
+    /// the edge where that meets another, beyond the ends of both.
     pub fn passed_at_end(
         &self,
         surface: usize,
@@ -274,7 +275,8 @@ impl Walls {
         Some(Passage { normal: turned(passage.normal), ..passage })
     }
 
-    /// Whether the way from one place at the begin of a substep to another at its end `[s]` goes through a thin surface.
+    /// Whether the way from one place at the begin of a substep to another at its end `[s]` goes through a thin
+    /// surface.
     pub fn is_passed(
         &self,
         surface: usize,

@@ -5,9 +5,9 @@ use nalgebra::Vector3;
 use crate::contact_set::ContactSet;
 use crate::wall::Walls;
 
-/// Force of all grains on one wall, over [`crate::Simulation::unit_mass`], from the impulses of the lasting contacts in a
-/// substep: lambda / dt. Over g it is the number of grains that the wall carries. At rest it is exact; while
-/// grains collide it changes from substep to substep and lacks what impacts give.
+/// Force of all grains on one wall, over [`crate::Simulation::unit_mass`], from the impulses of the lasting contacts in
+/// a substep: lambda / dt. Over g it is the number of grains that the wall carries. At rest it is exact; while grains
+/// collide it changes from substep to substep and lacks what impacts give.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WallLoad {
     /// Force on the wall, normal and friction `[m/s^2]`.

@@ -377,8 +377,8 @@ proptest! {
             && health.worst_penetration <= settings.max_penetration
             && health.energy_created <= MAX_ENERGY_CREATED;
         prop_assert_eq!(is_sound, pour.status != Status::Unhealthy, "{:?} {:?}", pour.status, health);
-        // Walls that move put energy in, and so do a slope without end and a ball that enters; what leaves takes its own
-        // with it.
+        // Walls that move put energy in, and so do a slope without end and a ball that enters; what leaves takes its
+        // own with it.
         let is_closed = scene.walls.iter().all(|wall| wall.motion.is_still())
             && scene.periodic.is_none()
             && scene.outflow.is_none()

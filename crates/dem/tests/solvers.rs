@@ -77,7 +77,8 @@ fn heap() -> FrozenSolve {
     heap_of(0.5, 0.2, 0.1)
 }
 
-/// Of grains of these frictions, this time after it was let go `[s]`: at some moments contacts lock, and no method ends.
+/// Of grains of these frictions, this time after it was let go `[s]`: at some moments contacts lock, and no method
+/// ends.
 fn heap_of(sliding: f64, rolling: f64, seconds: f64) -> FrozenSolve {
     let mut scene = Scene::drop(0.01);
     scene.grains.count = 80;

@@ -213,8 +213,8 @@ pub enum Cleaned {
 }
 
 impl FeatureError {
-    /// [`FeatureError::EmptyMask`] of a simulated image, whose pixels are grains by their height alone: of so many valid
-    /// ones the highest is `highest` `[m]`, which is not above `threshold` `[m]`.
+    /// [`FeatureError::EmptyMask`] of a simulated image, whose pixels are grains by their height alone: of so many
+    /// valid ones the highest is `highest` `[m]`, which is not above `threshold` `[m]`.
     pub fn no_grain_in_image(valid: usize, highest: f64, threshold: f64) -> Self {
         Self::EmptyMask { valid, highest, threshold, above: 0, cleaned: None, extent: None }
     }

@@ -19,6 +19,7 @@ mod part;
 mod settings;
 mod shape;
 mod step;
+mod threshold;
 
 use nalgebra::Vector3;
 
@@ -26,8 +27,9 @@ pub use edge::EdgePixels;
 pub use formation::Formation;
 pub use levelled::Levelled;
 pub use part::Part;
-pub use settings::{Segmentation, Threshold};
+pub use settings::Segmentation;
 pub use shape::{Kind, Shape};
+pub use threshold::Threshold;
 
 use crate::camera::Camera;
 use crate::colour::ColourImage;
@@ -130,7 +132,8 @@ pub fn level_depth(
     Ok(in_field(levelled, segmentation, &along))
 }
 
-/// Refuses an image that is so small on the ground, `extent` `[m]`, that pixels of the width that is asked for leave none.
+/// Refuses an image that is so small on the ground, `extent` `[m]`, that pixels of the width that is asked for leave
+/// none.
 fn require_some(
     cloud: Cloud,
     segmentation: &Segmentation,

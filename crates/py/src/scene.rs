@@ -154,8 +154,8 @@ impl Scene {
         Ok((positions, PyArray1::from_slice(py, &simulation.radii())))
     }
 
-    /// Points whose hull every grain is, in the axes of its turn [m], so many on each rim of a cylinder; its centre of mass
-    /// where the shape is stated [m], and its axes there, a column each. None of round grains.
+    /// Points whose hull every grain is, in the axes of its turn [m], so many on each rim of a cylinder; its centre of
+    /// mass where the shape is stated [m], and its axes there, a column each. None of round grains.
     #[allow(clippy::type_complexity)] // Python's tuple.
     fn body<'py>(
         &self,

@@ -20,8 +20,8 @@ pub(crate) fn simulate(py: Python<'_>, scene: &Scene, seed: u64, threads: usize)
     Ok(simulation.pour())
 }
 
-/// Pours a scene for about `patience` [s] at most. Returns the processor time of the whole pour [s], extrapolated to its
-/// horizon if it was cut short, how far it came [s] and whether it ended.
+/// Pours a scene for about `patience` [s] at most. Returns the processor time of the whole pour [s], extrapolated to
+/// its horizon if it was cut short, how far it came [s] and whether it ended.
 #[pyfunction]
 pub(crate) fn try_pour(
     py: Python<'_>,

@@ -135,8 +135,8 @@ pub struct MeshFile {
 }
 
 impl MeshFile {
-    /// A mesh made in memory, in units of `unit` `[m]`, under a name for messages. Its hash is that of its triangles, so
-    /// that a checkpoint or a data set of another mesh is refused; from its TOML alone it cannot be had again.
+    /// A mesh made in memory, in units of `unit` `[m]`, under a name for messages. Its hash is that of its triangles,
+    /// so that a checkpoint or a data set of another mesh is refused; from its TOML alone it cannot be had again.
     pub fn of(mesh: Mesh, name: &str, unit: f64, closed: bool) -> Self {
         let hash = Some(mesh.hash());
         Self { file: name.to_owned(), unit, closed, hash, mesh: Some(Arc::new(mesh)) }

@@ -121,8 +121,8 @@ impl Prior {
         Ok(())
     }
 
-    /// Checks what the first `rows` rows of a seed draw where [`Self::check`] cannot tell: values of a normal that is not cut
-    /// off, and numbers of the scene that hang together, such as a diameter and a spacing.
+    /// Checks what the first `rows` rows of a seed draw where [`Self::check`] cannot tell: values of a normal that is
+    /// not cut off, and numbers of the scene that hang together, such as a diameter and a spacing.
     ///
     /// # Errors
     /// [`SceneError::PriorDoesNotFit`] names the first parameter and value that does not fit,
@@ -170,7 +170,8 @@ impl Prior {
         (0..self.parameters.len()).filter(|&i| varies(&self.parameters[i])).collect()
     }
 
-    /// Indices of the parameters that vary and are of no material, whose numbers bound each other and the start nowhere.
+    /// Indices of the parameters that vary and are of no material, whose numbers bound each other and the start
+    /// nowhere.
     pub fn free_beside_material(&self) -> Vec<usize> {
         let is_beside = |&n: &usize| !plain(&self.parameters[n].path).starts_with("material.");
         self.free().into_iter().filter(is_beside).collect()

@@ -1,10 +1,10 @@
-//! How fast a wall that turns sweeps: the speed of its surface along its own normal. A drum that turns about its own axis
-//! sweeps nothing, the tip of a blade as fast as it goes. A trajectory drifts besides, as seen from the wall.
+//! How fast a wall that turns sweeps: the speed of its surface along its own normal. A drum that turns about its own
+//! axis sweeps nothing, the tip of a blade as fast as it goes. A trajectory drifts besides, as seen from the wall.
 //!
 //! With the spin ω about a point p, x of the surface and n its normal there, the speed is n · (ω × (x - p)). Across a
-//! triangle it is linear, and largest at a corner. At a cone or cylinder x = c + r u, c on its axis a and u across it, and
-//! u · (ω × r u) = 0, so that what is left is of ω × (c - p), largest at an end, and, where n leans along the axis, of
-//! a · (ω × r u).
+//! triangle it is linear, and largest at a corner. At a cone or cylinder x = c + r u, c on its axis a and u across it,
+//! and u · (ω × r u) = 0, so that what is left is of ω × (c - p), largest at an end, and, where n leans along the axis,
+//! of a · (ω × r u).
 
 use nalgebra::Vector3;
 
@@ -72,8 +72,8 @@ impl Motion {
 }
 
 impl Wall {
-    /// Refuses a wall that jumps over grains: as its motion does, and one whose surface goes farther along its normal in a
-    /// substep of `dt` `[s]` than a grain is thick.
+    /// Refuses a wall that jumps over grains: as its motion does, and one whose surface goes farther along its normal
+    /// in a substep of `dt` `[s]` than a grain is thick.
     pub(crate) fn check_jumps(&self, name: &str, dt: f64, diameter: f64) -> Result<(), SceneError> {
         self.motion.check_jumps(name, dt, diameter)?;
         let fast = |turn: &Turn| turn.bound(&self.shape) * dt > diameter;

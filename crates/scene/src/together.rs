@@ -115,8 +115,8 @@ impl Scene {
             .try_for_each(|(name, wall)| wall.over(&self.material).check_bodies(&name, body))
     }
 
-    /// What grains that leave once they have rolled away cannot be with: what might turn one back, what looks at where it
-    /// is, and bodies that do not roll as balls do.
+    /// What grains that leave once they have rolled away cannot be with: what might turn one back, what looks at where
+    /// it is, and bodies that do not roll as balls do.
     fn check_rolled_away(&self) -> Result<(), SceneError> {
         if self.end.rolled_away == RolledAway::Stay {
             return Ok(());

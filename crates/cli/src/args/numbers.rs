@@ -1,9 +1,18 @@
 //! Numbers of more than one command.
 
+use std::str::FromStr;
 use std::time::Duration;
 
 pub fn seed(text: &str) -> Result<u64, String> {
     text.parse().map_err(|_| format!("must be a whole number from 0 to 2^64 - 1, got {text:?}"))
+}
+
+pub fn whole<T: FromStr>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|_| format!("must be a whole number, 0 or more, got {text:?}"))
+}
+
+pub fn number(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| format!("must be a number, got {text:?}"))
 }
 
 pub fn positive(text: &str) -> Result<f64, String> {

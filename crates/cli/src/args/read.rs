@@ -5,6 +5,7 @@ use std::path::Path;
 use clap::Args;
 use granulcal_dataset::ReadOptions;
 
+use super::numbers::whole;
 use super::paths::Reads;
 
 /// What of a recording is read.
@@ -28,7 +29,7 @@ pub struct ReadArgs {
     #[arg(long, value_name = "N", default_value = "10", value_parser = parse_frames)]
     pub frames: usize,
     /// Index of the first frame that is averaged, from 0 [default: so that the last are]
-    #[arg(long, value_name = "INDEX")]
+    #[arg(long, value_name = "INDEX", value_parser = whole::<u64>, allow_negative_numbers = true)]
     pub first_frame: Option<u64>,
 }
 

@@ -10,7 +10,7 @@ use granulcal_scene::Scene;
 use serde_json::json;
 
 use crate::args::SceneArgs;
-use crate::args::numbers::{period, seed};
+use crate::args::numbers::{period, seed, whole};
 use crate::args::paths::{Reads, Writes, writes};
 use crate::context::{Context, print_json, print_line};
 use crate::interrupt::keeps_going;
@@ -56,7 +56,7 @@ pub struct GenerateArgs {
     #[arg(long, value_name = "URL")]
     pub ray_store: Option<String>,
     /// Rows of the whole data set
-    #[arg(long = "rows", short = 'n', default_value_t = 1000)]
+    #[arg(long = "rows", short = 'n', default_value_t = 1000, value_parser = whole::<u64>, allow_negative_numbers = true)]
     pub rows: u64,
     /// Folder to write into
     #[arg(long = "out", short = 'o', value_name = "DIR", value_parser = writes(Product::DATA_SET))]
@@ -68,10 +68,10 @@ pub struct GenerateArgs {
     #[arg(long, value_name = "I/K", default_value = "0/1")]
     pub shard: Shard,
     /// Pours at once [default: all cores]
-    #[arg(long)]
+    #[arg(long, value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub threads: Option<usize>,
     /// Rows in a part
-    #[arg(long, default_value_t = 16)]
+    #[arg(long, default_value_t = 16, value_parser = whole::<u64>, allow_negative_numbers = true)]
     pub chunk: u64,
     /// Longest time that a finished row is in memory only, and a kill can lose it [s]
     #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = period)]

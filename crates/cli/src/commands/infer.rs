@@ -15,7 +15,7 @@ use granulcal_scene::Scene;
 use serde_json::json;
 
 use crate::args::ReadArgs;
-use crate::args::numbers::seed;
+use crate::args::numbers::{seed, whole};
 use crate::args::paths::{Reads, Writes, recording, writes};
 use crate::context::{note, print_json};
 use crate::outcome::{BadArgument, Outcome};
@@ -60,10 +60,10 @@ pub struct InferArgs {
     #[command(flatten)]
     pub read: ReadArgs,
     /// Ignore a frame of so many pixels
-    #[arg(long, value_name = "PIXELS")]
+    #[arg(long, value_name = "PIXELS", value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub border: Option<usize>,
     /// Print so many draws of the posterior in the JSON
-    #[arg(long, value_name = "N", default_value_t = 0, requires = "json")]
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "json", value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub samples: usize,
     /// Write the JSON with 1000 draws of the posterior to this file
     #[arg(long = "out", short = 'o', value_name = "OUT.json",

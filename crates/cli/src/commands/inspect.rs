@@ -95,7 +95,7 @@ fn dataset_facts(path: &Path) -> anyhow::Result<Value> {
         "version": dataset.header.version,
         "law": dataset.header.law,
         "arithmetic": dataset.header.arithmetic,
-        "cpu_s": dataset.rows.iter().map(|row| row.cpu_s).sum::<f64>(),
+        "cpu_s": dataset.rows.iter().fold(0.0, |sum, row| sum + row.cpu_s),
         "scene": scene_facts(&dataset.header.scene),
         "prior": prior_facts(&dataset.header.prior),
     }))

@@ -116,7 +116,8 @@ fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
     Ok(sides.finish(Outcome::healthy_if(status.is_healthy())))
 }
 
-/// The checkpoint to go on from: none yet where it is the one that this pour writes, so that one line begins and goes on.
+/// The checkpoint to go on from: none yet where it is the one that this pour writes, so that one line begins and goes
+/// on.
 fn resumed(args: &SimulateArgs) -> Option<&Path> {
     let path = args.resume.as_deref()?;
     let is_own = args.checkpoint.as_deref() == Some(path);

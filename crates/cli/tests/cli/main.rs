@@ -1,5 +1,5 @@
-//! The process boundary: exit codes, streams, files. What the numbers mean is tested elsewhere. One binary, because every
-//! further one is linked by itself.
+//! The process boundary: exit codes, streams, files. What the numbers mean is tested elsewhere. One binary, because
+//! every further one is linked by itself.
 
 mod batches;
 #[path = "../place/mod.rs"]

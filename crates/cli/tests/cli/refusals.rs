@@ -127,6 +127,19 @@ fn bad_recordings_are_named() {
 }
 
 #[test]
+fn numbers_on_the_command_line_are_refused_in_plain_words() {
+    let place = Place::new();
+    let rows = |n| ["generate", "drop", "default", "-o", "d", "-n", n];
+    for n in ["1e3", "-1", "all"] {
+        place.refused(&rows(n), &["--rows", "must be a whole number, 0 or more", n]);
+    }
+    let border = ["features", "a.bag", "--border", "-1"];
+    place.refused(&border, &["--border", "must be a whole number, 0 or more", "-1"]);
+    let baseline = ["fit-sensor", "a.bag", "-o", "s.toml", "--baseline", "wide"];
+    place.refused(&baseline, &["--baseline", "must be a number", "wide"]);
+}
+
+#[test]
 fn numbers_of_a_scene_that_cannot_be_are_told_from_paths_that_are_none() {
     let place = Place::new();
     let set = |change| ["simulate", "drop", "--set", change];

@@ -174,6 +174,17 @@ impl Product {
         if !folder.is_dir() {
             return Some(format!("{shown}, in which {wanted} is to be, is no folder"));
         }
+        let ending = path.extension().and_then(|end| Form::of_ending(&end.to_string_lossy()));
+        if let (Self::File(form), Some(other)) = (self, ending)
+            && other != form
+        {
+            return Some(format!(
+                "{} ends as {} does, and {} is written",
+                path.display(),
+                other.name(),
+                form.name()
+            ));
+        }
         match files::create_beside(&folder.join("granulcal")) {
             Ok((temporary, file)) => {
                 drop(file);

@@ -162,6 +162,18 @@ fn what_is_there_and_what_is_allowed_is_said() {
     assert_eq!(refusal(&[], &[(&at("empty.bag"), Product::MESSAGES)]), None);
 }
 
+#[test]
+fn a_name_does_not_end_as_a_file_of_another_kind() {
+    let place = tempfile::tempdir().unwrap();
+    let at = |name: &str| place.path().join(name);
+    let table = Product::File(Form::Parquet);
+    let message = refusal(&[], &[(&at("rows.csv"), table)]).unwrap_err_text();
+    assert!(message.contains("rows.csv") && message.contains("a Parquet table"), "{message}");
+    for name in ["rows.parquet", "rows.PARQUET", "rows", "rows.v1"] {
+        assert_eq!(refusal(&[], &[(&at(name), table)]), None);
+    }
+}
+
 /// A PNG that granulcal wrote.
 fn own_png(path: &Path) {
     files::write_file(path, Form::Png, b"\x89PNG\0\0\0\0IEND\xaeB`\x82").unwrap();

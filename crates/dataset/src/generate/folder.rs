@@ -118,8 +118,8 @@ impl Folder {
         Ok(Self { _lock: Some(lock), ..folder })
     }
 
-    /// The folder of a manifest, refused if that was made from something else; another arithmetic does not matter to who
-    /// adds no row.
+    /// The folder of a manifest, refused if that was made from something else; another arithmetic does not matter to
+    /// who adds no row.
     fn there(path: &Path, manifest: Manifest, header: &Header) -> Result<Self, DatasetError> {
         let Manifest { header: found, chunk, rows: asked } = manifest;
         let of_found = Header { arithmetic: found.arithmetic, ..header.clone() };

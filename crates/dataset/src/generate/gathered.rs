@@ -64,8 +64,8 @@ impl GatheredBatch {
         self.progress
     }
 
-    /// Takes the bytes of a chunk's part; returns whether it lacked it. Rows that are there stay, also those beyond what is
-    /// asked for.
+    /// Takes the bytes of a chunk's part; returns whether it lacked it. Rows that are there stay, also those beyond
+    /// what is asked for.
     ///
     /// # Errors
     /// [`DatasetError`] of a part that is damaged, not whole, of another batch or chunk; the folder is as before.

@@ -80,8 +80,8 @@ impl Observation for Discharge {
 /// Least-squares slope of a share against time within [`RATE_RANGE`] `[%/s]`, below 95 % of the largest share; NaN with
 /// fewer than two samples there.
 ///
-/// What stays behind, on a flat bottom or above an arch, is in no sample of the flow: however long it is looked at after
-/// the flow has stopped, the slope is the same.
+/// What stays behind, on a flat bottom or above an arch, is in no sample of the flow: however long it is looked at
+/// after the flow has stopped, the slope is the same.
 pub fn rate(times: &[f64], percent: &[f64]) -> f64 {
     let out = percent.iter().copied().fold(0.0, f64::max);
     let (low, high) = (RATE_RANGE.0, RATE_RANGE.1.min(BEFORE_THE_END * out));

@@ -7,13 +7,13 @@ use granulcal_numbers::short;
 use super::{HIDDEN, LEAST_VOLUME, LEFT_OVER, Limits};
 use crate::{Recording, Source};
 
-/// Share of a formation's volume in its largest patch, above which it is a heap from which grains may have rolled, and not
-/// what has rolled away. Of 460 pours of two priors no heap took less room than the grains by themselves.
+/// Share of a formation's volume in its largest patch, above which it is a heap from which grains may have rolled, and
+/// not what has rolled away. Of 460 pours of two priors no heap took less room than the grains by themselves.
 const HEAP: f64 = 0.5;
 /// Pixels of one, at least: grains that fall past the camera take its room, too.
 const HEAP_PIXELS: f64 = 30.0;
-/// Elongation that heaps may have. Of 460 pours of two priors 3 had more than that and chance; `test_doubts.py` asks for
-/// nine of ten heaps stretched by 1.6.
+/// Elongation that heaps may have. Of 460 pours of two priors 3 had more than that and chance; `test_doubts.py` asks
+/// for nine of ten heaps stretched by 1.6.
 const LONG: f64 = 0.06;
 /// It, and the mean direction about the middle of the image, times the root of the number of grains: of scattered ones,
 /// chance makes more in one of 8000 (exp(-9)).
@@ -141,8 +141,8 @@ impl Limits {
         self.is_axisymmetric && formation.lopsidedness() > most
     }
 
-    /// How many grains lie in their own directions: those of a heap, else no more than there are pixels, for of scattered
-    /// ones coarse pixels miss most, and what they hit takes the room of the others.
+    /// How many grains lie in their own directions: those of a heap, else no more than there are pixels, for of
+    /// scattered ones coarse pixels miss most, and what they hit takes the room of the others.
     fn independent(&self, formation: &Formation) -> f64 {
         let grains = formation.volume / (std::f64::consts::PI / 6.0 * self.diameter.powi(3));
         let pixels = formation.masked_count as f64;
@@ -150,7 +150,8 @@ impl Limits {
         if is_heap { grains } else { grains.min(pixels) }
     }
 
-    /// Whether it is longer than wide where nothing makes it so: neither the scene, nor an image that hides a side of it.
+    /// Whether it is longer than wide where nothing makes it so: neither the scene, nor an image that hides a side of
+    /// it.
     fn doubt_of_length(&self, formation: &Formation) -> Option<String> {
         let shown = self.shown.min(formation.shown.unwrap_or(1.0));
         // A side that is not seen takes scattered grains from one direction.

@@ -100,8 +100,8 @@ fn a_heap_that_lacks_grains_or_is_in_another_unit_cannot_be_of_the_scene() {
     assert!(on_a_table.contains("stand apart") && on_a_table.contains("is bent"), "{on_a_table}");
 }
 
-/// Heaps of a height and radius at places of a field of half a metre, 4 mm to a pixel, on a ground of some bow `[m]`, all
-/// stretched along x.
+/// Heaps of a height and radius at places of a field of half a metre, 4 mm to a pixel, on a ground of some bow `[m]`,
+/// all stretched along x.
 fn field(heaps: &[(f64, f64)], (high, radius): (f64, f64), stretch: f64, bow: f64) -> Formation {
     let (side, step) = (146, 4e-3);
     let half = 0.5 * side as f64;

@@ -20,8 +20,8 @@ pub(super) struct Depths {
     pub(super) count: u64,
 }
 
-/// Reads one image, shape (h, w), or frames of one formation, shape (k, h, w): floats are metres, whole numbers counts of
-/// the camera's unit.
+/// Reads one image, shape (h, w), or frames of one formation, shape (k, h, w): floats are metres, whole numbers counts
+/// of the camera's unit.
 ///
 /// # Errors
 /// [`DatasetError::Content`] for another shape, a size that is not the lens's, whole numbers without a unit.

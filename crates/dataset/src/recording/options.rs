@@ -11,8 +11,8 @@ pub const FRAMES: usize = 10;
 /// What of a recording is read, and what is known besides.
 #[derive(Clone, Debug)]
 pub struct ReadOptions {
-    /// TOML of the camera. Without one images as PNG or .npy take that under their own name, else `camera.toml` in their
-    /// folder or the one above; for other recordings it replaces what they say.
+    /// TOML of the camera. Without one images as PNG or .npy take that under their own name, else `camera.toml` in
+    /// their folder or the one above; for other recordings it replaces what they say.
     pub camera: Option<PathBuf>,
     /// Topic of the depth images, where several fit.
     pub topic: Option<String>,
@@ -36,8 +36,8 @@ fn camera_of_images_beside(path: &Path) -> Option<PathBuf> {
     own.into_iter().chain(shared).find(|file| file.is_file())
 }
 
-/// The camera by which a recording is read that is given none: beside an image as PNG or .npy or a folder of PNGs. None of
-/// recordings that say themselves what saw them, or that are not there.
+/// The camera by which a recording is read that is given none: beside an image as PNG or .npy or a folder of PNGs. None
+/// of recordings that say themselves what saw them, or that are not there.
 pub fn camera_beside(path: &Path) -> Option<PathBuf> {
     let ends = |path: &Path, all: &[&str]| {
         path.extension().is_some_and(|end| all.iter().any(|of| end.eq_ignore_ascii_case(of)))

@@ -125,8 +125,8 @@ impl<L: Lever> Batch<L> {
         one.over(largest).store(&mut self.compliance_t);
     }
 
-    /// One round of the two lines for each point; returns whether all are open and stay so, or no impulse has changed by
-    /// more than `idle`^2.
+    /// One round of the two lines for each point; returns whether all are open and stay so, or no impulse has changed
+    /// by more than `idle`^2.
     #[inline(always)]
     #[allow(unsafe_code)]
     fn solve<W: Width>(
@@ -191,8 +191,8 @@ widest! {
 }
 
 widest! {
-    /// Solves the points of those batches once that are idle, or those that are not, or both: those are idle that stay open
-    /// or change by no more than `idle` `[m/s]`.
+    /// Solves the points of those batches once that are idle, or those that are not, or both: those are idle that stay
+    /// open or change by no more than `idle` `[m/s]`.
     pub(super) fn sweep<W, L: Lever>(
         batches: &mut [Batch<L>],
         is_idle: &mut [bool],

@@ -79,7 +79,8 @@ pub(super) struct Moving {
     pub twist: Vector3<f64>,
     /// When the last of them was, from the begin of the substep; 0 if there was none `[s]`.
     pub hit: f64,
-    /// How it was turned then, and the angular velocity with which it went on `[rad/s]`; as at the begin if there was none.
+    /// How it was turned then, and the angular velocity with which it went on `[rad/s]`; as at the begin if there was
+    /// none.
     left: (UnitQuaternion<f64>, Vector3<f64>),
 }
 
@@ -122,8 +123,8 @@ impl Moving {
         self.shift + self.twist.cross(arm)
     }
 
-    /// The body `time` into the substep `[s]`, not before it was hit the last time: as it lies then, it takes impulses and
-    /// has its angular velocity.
+    /// The body `time` into the substep `[s]`, not before it was hit the last time: as it lies then, it takes impulses
+    /// and has its angular velocity.
     pub fn at(&self, time: f64, solid: &Solid) -> Self {
         if turns_alike(&solid.inertia) {
             return Self { pose: self.foreseen(time), ..*self };
@@ -167,8 +168,8 @@ impl Moving {
         Matrix3::identity() - at.cross_matrix() * self.inverse_inertia * of.cross_matrix()
     }
 
-    /// How it is turned `time` after it was hit the last time `[s]`, with this angular momentum; `twist` is by how much it
-    /// turns besides `[rad]`.
+    /// How it is turned `time` after it was hit the last time `[s]`, with this angular momentum; `twist` is by how much
+    /// it turns besides `[rad]`.
     fn turned_on(
         &self,
         momentum: &Vector3<f64>,

@@ -8,9 +8,9 @@
 //! g(d) = |t . d| - sum_k h_k |A_k . d| - sum_j h_j |B_j . d|
 //! ```
 //!
-//! and the largest of all is along an axis of either box, or across an edge of each (Gottschalk, Lin and Manocha, 1996).
-//! Boxes that are apart along several of a box's axes are so along a line between them: parry's rule, which is followed
-//! here to the choice among equals. Every width of registers gives the same bits.
+//! and the largest of all is along an axis of either box, or across an edge of each (Gottschalk, Lin and Manocha,
+//! 1996). Boxes that are apart along several of a box's axes are so along a line between them: parry's rule, which is
+//! followed here to the choice among equals. Every width of registers gives the same bits.
 
 use nalgebra::Vector3;
 

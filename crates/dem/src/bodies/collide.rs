@@ -1,5 +1,5 @@
-//! Where bodies touch each other and the walls: manifolds between bodies, the nearest points of the body's own corners at
-//! walls.
+//! Where bodies touch each other and the walls: manifolds between bodies, the nearest points of the body's own corners
+//! at walls.
 
 use nalgebra::Vector3;
 
@@ -129,8 +129,8 @@ pub(super) fn clearance(solid: &Solid, a: &Pose, b: &Pose) -> f64 {
     (square - extent(a) - extent(b)) / square.sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// Adds the points of body `i` at the surfaces of walls, at their rims and at the edges of their triangles that are nearer
-/// than `range` `[m]` at `now` `[s]` into the substep; returns whether any may be so near.
+/// Adds the points of body `i` at the surfaces of walls, at their rims and at the edges of their triangles that are
+/// nearer than `range` `[m]` at `now` `[s]` into the substep; returns whether any may be so near.
 pub(super) fn at_all_of_walls(
     around: &Around<'_>,
     body: &Pose,
@@ -178,7 +178,8 @@ fn at_walls(
             if is_beyond && (!wall.has_facets() || walls.is_sharp_at(surface, &corner, now)) {
                 return;
             }
-            // A corner that has come through a shell, and not round its end, is on the other side of it than the centre.
+            // A corner that has come through a shell, and not round its end, is on the other side of it than the
+            // centre.
             let from_wall = near.distance * near.normal - arm;
             let mut is_through = near.side != 0
                 && near.distance > 0.0

@@ -129,8 +129,8 @@ impl Point {
         }
     }
 
-    /// This point, found where its bodies will be at the end of the substep, as it is now: with the gap from which their
-    /// velocities lead to the one that is foreseen.
+    /// This point, found where its bodies will be at the end of the substep, as it is now: with the gap from which
+    /// their velocities lead to the one that is foreseen.
     pub fn foreseen<'p>(
         mut self,
         bodies: &[Moving],
@@ -143,8 +143,8 @@ impl Point {
         self
     }
 
-    /// Moves it with its bodies, from where these lay to where they lie: half way between its places on both, for only an
-    /// impulse at one place keeps their angular momentum.
+    /// Moves it with its bodies, from where these lay to where they lie: half way between its places on both, for only
+    /// an impulse at one place keeps their angular momentum.
     pub fn carry(&mut self, lay: impl Fn(usize) -> Pose, lies: impl Fn(usize) -> Pose) {
         let carried = |body: usize, arm: &Vector3<f64>| {
             let pose = lies(body);

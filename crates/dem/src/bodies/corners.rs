@@ -1,7 +1,7 @@
 //! Which corner of a hull is farthest along a direction: all are asked, eight at a time.
 //!
-//! GJK asks twice a step, and a superquadric has some two hundred. The products and sums are parry's, one by one, and of
-//! equals the first is taken, as there: the answer is the same.
+//! GJK asks twice a step, and a superquadric has some two hundred. The products and sums are parry's, one by one, and
+//! of equals the first is taken, as there: the answer is the same.
 
 use nalgebra::Vector3;
 

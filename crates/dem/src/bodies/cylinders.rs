@@ -173,9 +173,9 @@ fn side_and_rim([one, other]: [&Cylinder; 2], along: &Vector3<f64>) -> [Vector3<
     [place + one.radius * out, on_2]
 }
 
-/// The point of an ellipse that is nearest to one outside of it, in its half axes k: x_i = k_i^2 y_i / (t + k_i^2), with
-/// sum (x_i / k_i)^2 = 1, has the root t to which Newton's steps rise (D. Eberly, Distance from a point to an ellipse,
-/// 2013).
+/// The point of an ellipse that is nearest to one outside of it, in its half axes k: x_i = k_i^2 y_i / (t + k_i^2),
+/// with sum (x_i / k_i)^2 = 1, has the root t to which Newton's steps rise (D. Eberly, Distance from a point to an
+/// ellipse, 2013).
 fn nearest_of_ellipse(half: [f64; 2], outside: [f64; 2]) -> [f64; 2] {
     let square = half.map(|half| half * half);
     let share = |i: usize, root: f64| {

@@ -1,9 +1,9 @@
 //! Where bodies touch the edges of triangles: the side of a tray, the outlet of a hopper, the ridge of a wedge.
 //!
 //! With f(t) the height of an edge's point over the body's faces, negative inside, a convex function, the edge touches
-//! where f is least: at its end, or where a face that falls along it meets one that rises. Between these two the normal is
-//! at right angles to the edge. A face that lies along the edge touches it at both ends of what they share. An edge in the
-//! body came in through a face into which its triangles do not lead: others are not asked.
+//! where f is least: at its end, or where a face that falls along it meets one that rises. Between these two the normal
+//! is at right angles to the edge. A face that lies along the edge touches it at both ends of what they share. An edge
+//! in the body came in through a face into which its triangles do not lead: others are not asked.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -130,8 +130,8 @@ impl<'a> Seen<'a> {
         self.edge.holds(&-(self.into_body.inverse() * normal))
     }
 
-    /// Gives where the body is nearer to the edge than `range`: how far it is `[m]`, where on the body that is `[m]`, and
-    /// its outward normal there; both in its own axes.
+    /// Gives where the body is nearer to the edge than `range`: how far it is `[m]`, where on the body that is `[m]`,
+    /// and its outward normal there; both in its own axes.
     fn touched(&self, range: f64, found: impl FnMut(f64, Vector3<f64>, Vector3<f64>)) {
         let any = |_: &Vector3<f64>| true;
         let least = self.least(&any);

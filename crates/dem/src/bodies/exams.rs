@@ -333,8 +333,8 @@ fn spinning_cubes_do_not_enter_each_other() {
     assert!(deepest < 0.04 * SIZE, "{} of a cube", deepest / SIZE);
 }
 
-/// What is out of a body's reach is not once an impact has changed its motion: the ground of a cube that another strikes,
-/// the neighbour of a ball, and a ball that falls behind one which the ground stops.
+/// What is out of a body's reach is not once an impact has changed its motion: the ground of a cube that another
+/// strikes, the neighbour of a ball, and a ball that falls behind one which the ground stops.
 #[test]
 fn what_is_struck_enters_nothing() {
     let struck = |shape: &GrainShape, bodies: [(f64, f64); 3]| {

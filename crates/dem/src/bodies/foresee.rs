@@ -21,8 +21,8 @@ const SAME_WAY: f64 = 2e-3;
 const KNOWN_WAY: f64 = 0.5 * SAME_PLACE;
 
 impl Contacts {
-    /// Adds the points at which bodies would lie in something at the end of the substep, behind the others: a corner that
-    /// swings in from elsewhere is none of those that are nearest at its begin. Returns whether there are any.
+    /// Adds the points at which bodies would lie in something at the end of the substep, behind the others: a corner
+    /// that swings in from elsewhere is none of those that are nearest at its begin. Returns whether there are any.
     pub fn foresee(
         &mut self,
         around: &Around<'_>,

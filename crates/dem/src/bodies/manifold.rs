@@ -135,8 +135,8 @@ fn between_faces(
 }
 
 /// GJK on two bodies of one shape, with parry's simplex: parry's own loop goes on to 5e-8 of the distance, which takes
-/// curved bodies some 25 steps. The distance between the simplex and the origin is too long, by no more than it is longer
-/// than the way to the plane across it that no body crosses. None where the bodies touch.
+/// curved bodies some 25 steps. The distance between the simplex and the origin is too long, by no more than it is
+/// longer than the way to the plane across it that no body crosses. None where the bodies touch.
 fn by_gjk(pose: &ParryPose, body: &Core<'_>, farthest: f64) -> Option<Nearest> {
     let start = pose.translation.try_normalize().unwrap_or(Vector::X);
     let mut simplex = VoronoiSimplex::new();
@@ -257,8 +257,8 @@ mod tests {
         }
 
         /// Of bodies that overlap by little the deepest point is as deep as they are along the cores' way out n. It is
-        /// longer than another, EPA's m, by no more than k / (1 - k) (n - m) . t, k what the cores lack and t the offset:
-        /// along n the cores are farthest apart.
+        /// longer than another, EPA's m, by no more than k / (1 - k) (n - m) . t, k what the cores lack and t the
+        /// offset: along n the cores are farthest apart.
         #[test]
         fn cores_find_the_way_out_of_an_overlap(
             cylinder in any::<bool>(),

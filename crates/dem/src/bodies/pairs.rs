@@ -10,8 +10,8 @@ use crate::cells::pairs_within;
 /// Pairs are sought so much farther than a body goes, for the impacts that make it faster, in its reach `[-]`.
 pub(super) const SLACK: f64 = 0.1;
 
-/// They are known for as much farther as lets every body go so far, in its reach `[-]`, and for so many substeps as fast as
-/// it was when they were found.
+/// They are known for as much farther as lets every body go so far, in its reach `[-]`, and for so many substeps as
+/// fast as it was when they were found.
 const SKIN: f64 = 0.125;
 const AHEAD: f64 = 6.0;
 
@@ -22,7 +22,8 @@ pub(super) struct Pair {
     pub j: usize,
     /// How far from each other they may be at the begin of the substep and meet in it `[m]`.
     pub range: f64,
-    /// They are at least so far from each other at the begin of the substep; minus infinity where nothing is known `[m]`.
+    /// They are at least so far from each other at the begin of the substep; minus infinity where nothing is known
+    /// `[m]`.
     pub clear: f64,
 }
 

@@ -1,11 +1,11 @@
 //! What two faces share: a parallelogram within a rectangle.
 //!
-//! Each edge of the parallelogram is cut to what of it is between both pairs of sides (Liang and Barsky, 1984); the corners
-//! of what is shared are the ends of these parts, and those corners of the rectangle that are in the parallelogram. All
-//! twelve are worked out and those that count are kept, which leaves a processor nothing to guess.
+//! Each edge of the parallelogram is cut to what of it is between both pairs of sides (Liang and Barsky, 1984); the
+//! corners of what is shared are the ends of these parts, and those corners of the rectangle that are in the
+//! parallelogram. All twelve are worked out and those that count are kept, which leaves a processor nothing to guess.
 
-/// How far a corner of the rectangle is within the parallelogram, over its half edges: what is nearer to an edge is no other
-/// than that edge's end `[-]`.
+/// How far a corner of the rectangle is within the parallelogram, over its half edges: what is nearer to an edge is no
+/// other than that edge's end `[-]`.
 const WITHIN: f64 = 1.0 - 1e-9;
 
 /// Corners of a convex polygon; with each two coordinates a number that is linear in its place.

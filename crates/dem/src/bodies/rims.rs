@@ -1,7 +1,9 @@
-//! Where bodies touch the rims of walls: the tip of a funnel, the edge between its cone and its stem, the edge of a bowl.
+//! Where bodies touch the rims of walls: the tip of a funnel, the edge between its cone and its stem, the edge of a
+//! bowl.
 //!
-//! With f(p) the height of a point over the body's faces, negative inside, a rim touches at the point of its circle where
-//! f is least. It counts if f grows into each of the rim's surfaces: else a corner of the body meets one of them first.
+//! With f(p) the height of a point over the body's faces, negative inside, a rim touches at the point of its circle
+//! where f is least. It counts if f grows into each of the rim's surfaces: else a corner of the body meets one of them
+//! first.
 
 use std::f64::consts::FRAC_PI_2;
 

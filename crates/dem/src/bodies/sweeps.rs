@@ -164,8 +164,8 @@ impl<L: Lever> BatchesOf<L> {
         self.bodies.push(Body::default());
     }
 
-    /// Puts points into batches: those that push first, apart from those that are open, of which most batches stay as they
-    /// are in a sweep.
+    /// Puts points into batches: those that push first, apart from those that are open, of which most batches stay as
+    /// they are in a sweep.
     fn add(&mut self, points: &[Point], moving: &[Moving], around: &Around<'_>) {
         let known = self.places.len();
         self.places.resize(known + points.len(), (0, 0));
@@ -264,8 +264,8 @@ fn body(velocity: Vector3<f64>, spin: Vector3<f64>) -> Body {
 /// No point.
 const NONE: u32 = u32::MAX;
 
-/// Puts points together that share no body, eight at most: those of one colour, which is the lowest that neither body has
-/// yet.
+/// Puts points together that share no body, eight at most: those of one colour, which is the lowest that neither body
+/// has yet.
 fn together(points: &[Point], some: &[u32], masks: &mut [u64]) -> Vec<[u32; LANES]> {
     masks.fill(0);
     let mut counts = [0; COLOURS + 1];

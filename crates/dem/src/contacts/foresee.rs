@@ -1,8 +1,8 @@
 //! What the spheres of rigid bodies come to in a substep beside what their first normals and velocities said.
 //!
 //! A body that is struck within the contact solve goes elsewhere than it did when contacts were listed, its spheres go
-//! round arcs, and what passes another no longer does so at the speed that it had. So the ends of the ways are looked at
-//! once the contacts are solved, as those of convex bodies are (docs/theory/bodies.md, foreseen points):
+//! round arcs, and what passes another no longer does so at the speed that it had. So the ends of the ways are looked
+//! at once the contacts are solved, as those of convex bodies are (docs/theory/bodies.md, foreseen points):
 //!
 //! ```text
 //! delta = g_end - (g + dt w_n),   b = b(g) + delta / dt    where w_n + b < 0

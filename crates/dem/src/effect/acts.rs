@@ -37,8 +37,8 @@ pub(crate) trait Acts: Debug + Send + Sync {
         None
     }
 
-    /// Changes velocities as they are at the begin of the substep, before gravity acts; returns the work of moving walls,
-    /// per typical mass `[m^2/s^2]`.
+    /// Changes velocities as they are at the begin of the substep, before gravity acts; returns the work of moving
+    /// walls, per typical mass `[m^2/s^2]`.
     fn act_before_gravity(&self, _particles: &mut Particles, _context: &EffectContext<'_>) -> f64 {
         0.0
     }

@@ -7,10 +7,11 @@
 //! v' = v - C (Phi(h') - Phi(h)),   h' = h + v' dt,   Phi(h) = ln(h / h_0) from h_0 on, (h - h_0) / h_0 below
 //! ```
 //!
-//! one pair after the other: no film is too thick for the substep, and none can turn a motion round. What comes together
-//! is slowed before gravity acts and impacts are looked for, up to the contact; what parts, after both, from the contact
-//! on. So grains that rest on each other, which gravity brings together for the length of a substep, have no film
-//! between them that would carry them. What slides past each other at u_t is resisted by an impulse at both surfaces,
+//! one pair after the other: no film is too thick for the substep, and none can turn a motion round. What comes
+//! together is slowed before gravity acts and impacts are looked for, up to the contact; what parts, after both, from
+//! the contact on. So grains that rest on each other, which gravity brings together for the length of a substep, have
+//! no film between them that would carry them. What slides past each other at u_t is resisted by an impulse at both
+//! surfaces,
 //!
 //! ```text
 //! J_t = -k_t u_t / (1 + (1 + 5/2) k_t (w_i + w_j))
@@ -125,8 +126,8 @@ impl Film {
     /// f(v') = v' - v + C (Phi(h + v' dt) - Phi(h))
     /// ```
     ///
-    /// which grows with v' and bends downwards as long as the way ends at a gap, so that Newton's steps come to the root
-    /// from below, once they are there, and do not pass it.
+    /// which grows with v' and bends downwards as long as the way ends at a gap, so that Newton's steps come to the
+    /// root from below, once they are there, and do not pass it.
     fn slowed(&self, c: f64, gap: f64, v: f64, dt: f64) -> f64 {
         let start = self.phi(gap.max(0.0));
         // The way ends in the contact, out of the film's reach, or where the force is no longer larger.

@@ -1,14 +1,16 @@
 //! Drag and added mass between a sheet of liquid and the grains in it, implicit in both.
 //!
-//! A grain of mass m, rate k and added mass A m, between two circles with weights w, follows the liquid of the new step,
+//! A grain of mass m, rate k and added mass A m, between two circles with weights w, follows the liquid of the new
+//! step,
 //!
 //! ```text
 //! v' = (v + A (v - U) + K sum of w u') / (1 + K),   K = k dt + A,   U = sum of w u
 //! ```
 //!
-//! and gives each circle `w m (K (v' - u') - A (v - u))`, so that no drag is too strong for the step, and what one gains
-//! the other loses. A is half of the displaced mass over the grain's, as of a sphere alone: between packed spheres, too,
-//! whose tortuosity is `(1 + 1 / eps) / 2` (Berryman, Applied Physics Letters 37 (1980) 382, doi:10.1063/1.91951).
+//! and gives each circle `w m (K (v' - u') - A (v - u))`, so that no drag is too strong for the step, and what one
+//! gains the other loses. A is half of the displaced mass over the grain's, as of a sphere alone: between packed
+//! spheres, too, whose tortuosity is `(1 + 1 / eps) / 2` (Berryman, Applied Physics Letters 37 (1980) 382,
+//! doi:10.1063/1.91951).
 
 use super::rows::Rows;
 
@@ -28,8 +30,8 @@ pub(crate) struct Dragged {
 }
 
 impl Dragged {
-    /// The circles around it where liquid flows, or where it stands at a wall, each with its weight; it is not dragged by
-    /// what is not there.
+    /// The circles around it where liquid flows, or where it stands at a wall, each with its weight; it is not dragged
+    /// by what is not there.
     pub(super) fn weights(&self, mass: &[f64]) -> Vec<(usize, f64)> {
         let (circle, share) = (self.at as usize, self.at.fract());
         let flows = |circle: usize| mass.get(circle).is_some_and(|&mass| mass > 0.0);

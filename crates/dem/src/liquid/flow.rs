@@ -6,19 +6,19 @@
 //! f = max(24 / Re, 0.223 Re^-1/4),   Re = q |u| / nu
 //! ```
 //!
-//! q is the volume of liquid over an area, s that of solids with the void eps between them (`solids.rs`), h the height of
-//! the liquid's surface, c what menisci between grains draw it down by, u its velocity outwards. What spreads sinks, and
-//! must be let down: without the second term, which is the mass of that motion, the edge of a column would be off at once
-//! at twice the speed of a wave (Serre, La Houille Blanche 39 (1953) 374; Green and Naghdi, J. Fluid Mech. 78 (1976) 237,
-//! of which it is what is linear in the velocity); grains of velocity v that it sinks past, with a drag of rate k, hold it
-//! up (Dupuit's assumption to the next order). Friction on the ground is that of a sheet on a smooth bed, laminar or
-//! Blasius' (Chow, Open-Channel Hydraulics (1959), section 1-3).
+//! q is the volume of liquid over an area, s that of solids with the void eps between them (`solids.rs`), h the height
+//! of the liquid's surface, c what menisci between grains draw it down by, u its velocity outwards. What spreads sinks,
+//! and must be let down: without the second term, which is the mass of that motion, the edge of a column would be off
+//! at once at twice the speed of a wave (Serre, La Houille Blanche 39 (1953) 374; Green and Naghdi, J. Fluid Mech. 78
+//! (1976) 237, of which it is what is linear in the velocity); grains of velocity v that it sinks past, with a drag of
+//! rate k, hold it up (Dupuit's assumption to the next order). Friction on the ground is that of a sheet on a smooth
+//! bed, laminar or Blasius' (Chow, Open-Channel Hydraulics (1959), section 1-3).
 //!
 //! Volumes stand in rings, velocities at the circles between them; velocities are advected such that momentum is kept
-//! (Stelling and Duinmeijer, International Journal for Numerical Methods in Fluids 43 (2003) 1329, doi:10.1002/fld.537),
-//! which tells bores and dry fronts alike. Friction is implicit. At the edge to dry ground surface tension holds the sheet
-//! back with `g e^2 / 2` over a length of edge, e the thickness of a puddle at rest. Under a tube that is being lifted the
-//! liquid has the gap alone.
+//! (Stelling and Duinmeijer, International Journal for Numerical Methods in Fluids 43 (2003) 1329,
+//! doi:10.1002/fld.537), which tells bores and dry fronts alike. Friction is implicit. At the edge to dry ground
+//! surface tension holds the sheet back with `g e^2 / 2` over a length of edge, e the thickness of a puddle at rest.
+//! Under a tube that is being lifted the liquid has the gap alone.
 
 use serde::{Deserialize, Serialize};
 

@@ -12,8 +12,8 @@ pub(crate) struct Ground {
     pub viscosity: f64,
     /// Thickness e of a puddle at rest `[m]`.
     pub puddle: f64,
-    /// Height c that a surface between grains is drawn up by its menisci, and how far below the grains' surface they have
-    /// all of it `[m]`.
+    /// Height c that a surface between grains is drawn up by its menisci, and how far below the grains' surface they
+    /// have all of it `[m]`.
     pub suction: (f64, f64),
     /// The circle that a tube stands on, and the gap below it `[m]`.
     pub gate: Option<(usize, f64)>,

@@ -1,5 +1,5 @@
-//! How the velocities of a sheet change in a step: what they carry with them, the pressure, the edge to dry ground, and,
-//! implicitly, the ground and the grains.
+//! How the velocities of a sheet change in a step: what they carry with them, the pressure, the edge to dry ground,
+//! and, implicitly, the ground and the grains.
 //!
 //! Of the changes a of all circles at once,
 //!

@@ -5,8 +5,8 @@
 //! h = q / eps up to b, q + s above it
 //! ```
 //!
-//! Of a body of grains that stands on the ground with the same void everywhere the top b is twice the mean height: a layer
-//! of spheres has its diameter, and more void than a packing.
+//! Of a body of grains that stands on the ground with the same void everywhere the top b is twice the mean height: a
+//! layer of spheres has its diameter, and more void than a packing.
 
 use std::f64::consts::PI;
 

@@ -132,8 +132,8 @@ impl Simulation {
         }
     }
 
-    /// Whether a grain is on the ground, farther out of view than [`BEYOND`], and will roll on outward: friction takes a
-    /// ball that slides with v and would roll with v_r to (5 v + 2 v_r) / 7, whatever the friction.
+    /// Whether a grain is on the ground, farther out of view than [`BEYOND`], and will roll on outward: friction takes
+    /// a ball that slides with v and would roll with v_r to (5 v + 2 v_r) / 7, whatever the friction.
     fn has_rolled_away(&self, grain: usize) -> bool {
         let (place, radius) = (self.particles.position(grain), self.particles.radius(grain));
         let across = place.xy();

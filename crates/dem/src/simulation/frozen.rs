@@ -48,7 +48,8 @@ impl Simulation {
         Ok(FrozenSolve::new([pairs, at_walls], copy.particles, self.around.least))
     }
 
-    /// What of the scene makes contacts other than those of balls: a shape, or an effect that changes what a contact is.
+    /// What of the scene makes contacts other than those of balls: a shape, or an effect that changes what a contact
+    /// is.
     fn beyond_plain_contacts(&self) -> Option<&'static str> {
         let shape = self.bodies.as_ref().map(|_| "grains.shape");
         shape.or_else(|| self.origin.scene.effects.of_contacts())

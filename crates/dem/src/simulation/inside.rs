@@ -7,8 +7,8 @@ use crate::energy::Energy;
 use crate::error::DemError;
 
 impl Simulation {
-    /// Mass over which energies and forces are told `[kg]`: that of a typical grain, and with `effects.fluid` what of the
-    /// fluid moves with it.
+    /// Mass over which energies and forces are told `[kg]`: that of a typical grain, and with `effects.fluid` what of
+    /// the fluid moves with it.
     pub fn unit_mass(&self) -> f64 {
         self.scene().grains.mass() / inverse_inertia(self.scene())
     }
@@ -25,7 +25,8 @@ impl Simulation {
         (0..self.particles.count()).map(|grain| typical * self.particles.mass(grain)).collect()
     }
 
-    /// Mechanical energy of all grains, over [`Simulation::unit_mass`]. Grains that have left the scene rest where they left.
+    /// Mechanical energy of all grains, over [`Simulation::unit_mass`]. Grains that have left the scene rest where they
+    /// left.
     pub fn energy(&self) -> Energy {
         let grains = (self.clumps.as_ref(), self.bodies.as_ref());
         let held = self.bonds.as_ref().map_or(0.0, |bonds| bonds.energy(&self.particles));

@@ -18,8 +18,8 @@ impl Rest {
     /// Of a scene under `gravity` less buoyancy `[m/s^2]`, at which is looked every `look` seconds.
     ///
     /// A grain that flies freely is slower than v_0 = sqrt(2 energy) for 2 v_0 / g at most, from -v_0 to v_0. Of two
-    /// looks one finds it at g look / 2 or more, wherever its turning point is. In a fluid it gets no faster than Stokes'
-    /// v_t = |rho - rho_f| g d^2 / (18 mu): rest is slower than half of that.
+    /// looks one finds it at g look / 2 or more, wherever its turning point is. In a fluid it gets no faster than
+    /// Stokes' v_t = |rho - rho_f| g d^2 / (18 mu): rest is slower than half of that.
     pub fn of(scene: &Scene, gravity: f64, look: f64) -> Self {
         let (fluid, grains) = (scene.effects.fluid, &scene.grains);
         let slow = (2.0 * scene.end.kinetic_energy).sqrt();

@@ -13,7 +13,8 @@ use crate::parallel::Threads;
 use crate::path::{Path, Reach};
 use crate::wall::Walls;
 
-/// How deep in a wall or in another a grain may start, in its radii: as deep as the hastiest preset lets grains at rest be.
+/// How deep in a wall or in another a grain may start, in its radii: as deep as the hastiest preset lets grains at rest
+/// be.
 const MAX_DEPTH: f64 = 0.25;
 
 /// What the grains of a start are too deep in.

@@ -1,9 +1,10 @@
-//! An edge of a triangle where its mesh ends or bends, as faces of bodies that are not round meet it (`bodies/edges.rs`).
+//! An edge of a triangle where its mesh ends or bends, as faces of bodies that are not round meet it
+//! (`bodies/edges.rs`).
 
 use nalgebra::Vector3;
 
-/// A way that leads into a body by less than this leads along it, as a sine `[-]`: a face lies flat on an edge of what it
-/// lies on, but for rounding.
+/// A way that leads into a body by less than this leads along it, as a sine `[-]`: a face lies flat on an edge of what
+/// it lies on, but for rounding.
 const ALONG: f64 = 0.02;
 
 /// A triangle across an edge.
@@ -43,8 +44,8 @@ impl<'a> Edge<'a> {
         Self { from, along, length, inwards, across, leaving }
     }
 
-    /// Whether a thing that lies towards `normal` of the edge touches it and not a triangle beside it: into each of them
-    /// the way leads off it.
+    /// Whether a thing that lies towards `normal` of the edge touches it and not a triangle beside it: into each of
+    /// them the way leads off it.
     pub fn holds(&self, normal: &Vector3<f64>) -> bool {
         let others = self.across.iter().map(|other| &other.inwards);
         others.chain([&self.inwards]).all(|into| leads_off(normal, into))

@@ -18,8 +18,8 @@ pub(crate) enum Led {
 }
 
 impl Walls {
-    /// Calls `found` for every edge of a wall's triangles that may be nearer to a place than `range` `[m]` at `now` `[s]`
-    /// into the substep, with the number after all surfaces and rims that the edges of its wall have in common.
+    /// Calls `found` for every edge of a wall's triangles that may be nearer to a place than `range` `[m]` at `now`
+    /// `[s]` into the substep, with the number after all surfaces and rims that the edges of its wall have in common.
     pub fn edges(
         &self,
         place: &Vector3<f64>,
@@ -43,8 +43,8 @@ impl Walls {
         facets.is_sharp_at(number, &wall.stated_place(place, now))
     }
 
-    /// How the way from one place to another, at `now` `[s]` into a substep, that ends on the other side of a triangle leads
-    /// there. What crosses its plane nearer to it than `least` `[m]` has not surely gone round.
+    /// How the way from one place to another, at `now` `[s]` into a substep, that ends on the other side of a triangle
+    /// leads there. What crosses its plane nearer to it than `least` `[m]` has not surely gone round.
     pub fn way(&self, surface: usize, [from, to]: [&Vector3<f64>; 2], now: f64, least: f64) -> Led {
         let (owner, wall, number) = self.found(surface);
         let Part::Triangle(facets, number) = wall.part(number) else { return Led::Through };

@@ -178,8 +178,8 @@ impl Facets {
         Nearest { distance, normal, side, bends: !is_inside }
     }
 
-    /// Whether what a triangle was to a place is gone on with by another, which lies towards `normal` of it: the place has
-    /// left the one, and the nearest point of either lies the same way.
+    /// Whether what a triangle was to a place is gone on with by another, which lies towards `normal` of it: the place
+    /// has left the one, and the nearest point of either lies the same way.
     pub fn is_left_to(&self, number: usize, normal: &Vector3<f64>, centre: &Vector3<f64>) -> bool {
         if self.nearest(number, centre).distance.is_finite() {
             return false;
@@ -229,7 +229,8 @@ impl Facets {
         is_through.then_some(passage)
     }
 
-    /// Whether the point of a triangle that is nearest to a place is on an edge or a corner where the mesh ends or bends.
+    /// Whether the point of a triangle that is nearest to a place is on an edge or a corner where the mesh ends or
+    /// bends.
     pub fn is_sharp_at(&self, number: usize, place: &Vector3<f64>) -> bool {
         let facet = &self.all[number];
         match facet.triangle.project_local_point_and_get_location(parry(place), false).1 {
@@ -256,8 +257,8 @@ impl Facets {
         })
     }
 
-    /// How far from a triangle a way from one place to another crosses its plane, 0 in it `[m]`, and where; nothing if it
-    /// does not but for rounding.
+    /// How far from a triangle a way from one place to another crosses its plane, 0 in it `[m]`, and where; nothing if
+    /// it does not but for rounding.
     pub fn crossed_beside(
         &self,
         number: usize,

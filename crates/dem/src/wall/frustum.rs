@@ -1,5 +1,5 @@
-//! A frustum, a cone or a cylinder, is a thin shell of revolution. In the half plane through its axis and the grain it is
-//! a straight segment, so the nearest point is the nearest point of a segment.
+//! A frustum, a cone or a cylinder, is a thin shell of revolution. In the half plane through its axis and the grain it
+//! is a straight segment, so the nearest point is the nearest point of a segment.
 
 use nalgebra::Vector3;
 

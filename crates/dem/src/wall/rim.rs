@@ -1,7 +1,7 @@
 //! Rims of shells and discs: where a wall ends, or where two bend away from what they hold.
 //!
-//! A ball meets a rim at the point that is nearest to its centre. A face or an edge of a body that is not round meets it
-//! anywhere along the circle (`bodies/rims.rs`).
+//! A ball meets a rim at the point that is nearest to its centre. A face or an edge of a body that is not round meets
+//! it anywhere along the circle (`bodies/rims.rs`).
 
 use nalgebra::{Vector2, Vector3};
 

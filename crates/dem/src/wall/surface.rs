@@ -52,8 +52,8 @@ impl Surface {
         }
     }
 
-    /// The circle at the end of the surface round which the way from one place to another leads, if both are on different
-    /// sides of it and of what would go on beyond its end: its centre and radius `[m]`.
+    /// The circle at the end of the surface round which the way from one place to another leads, if both are on
+    /// different sides of it and of what would go on beyond its end: its centre and radius `[m]`.
     pub fn leads_round(
         &self,
         from: &Vector3<f64>,

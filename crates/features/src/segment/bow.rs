@@ -6,8 +6,8 @@ use super::formation::Formation;
 use super::levelled::Levelled;
 use crate::median::median;
 
-/// Blocks along a side of the image whose medians the quadratic goes through: single pixels may be faults, and the flanks
-/// of grains that are below the threshold.
+/// Blocks along a side of the image whose medians the quadratic goes through: single pixels may be faults, and the
+/// flanks of grains that are below the threshold.
 const BLOCKS: usize = 8;
 /// Share of a block that is ground, at least; less of it are the gaps between grains.
 const GROUND: f64 = 0.5;

@@ -9,8 +9,8 @@ impl Formation {
     /// Length of the mean of exp(2 i phi) over the volume, with phi the direction from its middle `[-]`: 0 of what is
     /// round, square or regular otherwise, (s - 1)/(s + 1) of that stretched by s, 1 of a line.
     ///
-    /// Whatever its profile, few grains that have rolled far turn it no further than grains nearby. Of n grains that lie
-    /// independently of each other, in any direction alike, it is above t with the chance exp(-n t²).
+    /// Whatever its profile, few grains that have rolled far turn it no further than grains nearby. Of n grains that
+    /// lie independently of each other, in any direction alike, it is above t with the chance exp(-n t²).
     pub fn elongation(&self) -> f64 {
         let weights = || self.points.iter().map(|point| (point.xy(), point.z.max(0.0)));
         let all: f64 = weights().map(|(_, weight)| weight).sum();
@@ -23,9 +23,9 @@ impl Formation {
         if all > 0.0 { weights().map(of_one).sum::<Vector2<f64>>().norm() / all } else { 0.0 }
     }
 
-    /// Length of the mean of exp(i phi) over the volume, with phi the direction from the middle of the image `[-]`: 0 of
-    /// what lies evenly about it, whatever of it has left the image, 1 of what lies on one side. Of n grains that lie
-    /// independently of each other it is above t with the chance exp(-n t²).
+    /// Length of the mean of exp(i phi) over the volume, with phi the direction from the middle of the image `[-]`: 0
+    /// of what lies evenly about it, whatever of it has left the image, 1 of what lies on one side. Of n grains that
+    /// lie independently of each other it is above t with the chance exp(-n t²).
     pub fn lopsidedness(&self) -> f64 {
         let middle = 0.5 * Vector2::new((self.width - 1) as f64, (self.height - 1) as f64);
         let (mut sum, mut all) = (Vector2::zeros(), 0.0);

@@ -1,7 +1,7 @@
 //! The square of ground that the images of a scene show, cut out of a recording that shows more.
 //!
-//! What rolls out of the scene's view is in none of its images. A recording of 848 x 480 pixels whose shorter side is as
-//! long on the ground as theirs still has it, and radii and kurtosis of a formation with lone grains are others.
+//! What rolls out of the scene's view is in none of its images. A recording of 848 x 480 pixels whose shorter side is
+//! as long on the ground as theirs still has it, and radii and kurtosis of a formation with lone grains are others.
 
 use std::ops::RangeInclusive;
 
@@ -15,8 +15,8 @@ use crate::median::median;
 
 impl Levelled {
     /// Leaves the pixels of a square of ground of `field` `[m]`, its sides along those of the image, whose columns go
-    /// `along` in the frame of the input. Where the image goes on beyond it, its middle is that of the grains (medians),
-    /// as far as it stays in the image. Without a grain, all is left.
+    /// `along` in the frame of the input. Where the image goes on beyond it, its middle is that of the grains
+    /// (medians), as far as it stays in the image. Without a grain, all is left.
     pub(super) fn within(mut self, field: f64, along: &Vector3<f64>) -> Self {
         let upright = self.plane.plane.ground_from_world().rotation;
         let mut x = upright * along;

@@ -4,9 +4,9 @@ use super::component::patches;
 use super::formation::Formation;
 use super::part::Part;
 
-/// Standard deviation of heights about a pixel, over a grain's diameter, below which it is flat; the noise of the ground
-/// comes on top, and tells nothing where it is more than that. Of 60 pours of the default prior, seen with noise of 0.05
-/// diameters and pixels of 0.3 to 1.4, none had more than 3 such pixels together.
+/// Standard deviation of heights about a pixel, over a grain's diameter, below which it is flat; the noise of the
+/// ground comes on top, and tells nothing where it is more than that. Of 60 pours of the default prior, seen with noise
+/// of 0.05 diameters and pixels of 0.3 to 1.4, none had more than 3 such pixels together.
 const FLAT: f64 = 0.06;
 /// Width of what is looked at about a pixel, over a grain's diameter: a grain's own top is flat.
 const ABOUT: f64 = 0.6;

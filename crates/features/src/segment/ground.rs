@@ -23,8 +23,8 @@ const MAX_TIGHTENINGS: usize = 20;
 /// Share of the inlier distance from which three standard deviations count as no less.
 const SETTLED: f64 = 0.99;
 
-/// Length of the mean phase of distances that are in step, at least: 1 on level ground, 0.3 where a tilt spreads them over
-/// three quarters of one.
+/// Length of the mean phase of distances that are in step, at least: 1 on level ground, 0.3 where a tilt spreads them
+/// over three quarters of one.
 const IN_STEP: f64 = 0.3;
 
 /// Multiples of it, less their whole part, fill the numbers from 0 to 1 evenly.
@@ -47,7 +47,8 @@ const LEVEL_SCATTER: f64 = 1.0 / 3.0;
 const BETWEEN_LEVELS: f64 = 1e-3;
 /// What scatters less about a plane is of one count of a camera and no level `[m]`.
 const LEAST_SCATTER: f64 = 1e-5;
-/// Points between three and six standard deviations of a level from it, over those on it, at most: two levels have a gap.
+/// Points between three and six standard deviations of a level from it, over those on it, at most: two levels have a
+/// gap.
 const IN_GAP: f64 = 0.1;
 /// Inlier distance by which one of two levels is looked for, over the standard deviation about the plane between them.
 const LEVEL_REACH: f64 = 0.25;
@@ -119,9 +120,9 @@ impl Cloud {
     }
 }
 
-/// The plane fitted again to what the noise allows, until it allows no less, and the standard deviation about it `[m]`: the
-/// foot of a pile is within the first inlier distance and lifts the plane. A distance that is in `grown` may grow there.
-/// Depths are counted in `step`s `[m]`. `TooSteep` where it tips beyond the tilt `steepest` `[rad]`.
+/// The plane fitted again to what the noise allows, until it allows no less, and the standard deviation about it `[m]`:
+/// the foot of a pile is within the first inlier distance and lifts the plane. A distance that is in `grown` may grow
+/// there. Depths are counted in `step`s `[m]`. `TooSteep` where it tips beyond the tilt `steepest` `[rad]`.
 fn tightened(
     ground: &[Vector3<f64>],
     mut plane: PlaneFit,
@@ -169,8 +170,8 @@ fn shoulder(ground: &[Vector3<f64>], fit: &PlaneFit, reach: f64) -> f64 {
 /// within `reach` below the plane. Grains only ever add points above it, and dead pixels lie far
 /// beyond the reach.
 ///
-/// Of depths that are counted in `step`s `[m]` a level ground has most points at one count, and their median distance says
-/// nothing. Each point is then spread over its step, evenly.
+/// Of depths that are counted in `step`s `[m]` a level ground has most points at one count, and their median distance
+/// says nothing. Each point is then spread over its step, evenly.
 fn sd_from_below(ground: &[Vector3<f64>], fit: &PlaneFit, reach: f64, step: f64) -> f64 {
     let of_spread = |step: f64| {
         let spread = |i: usize| step * ((i as f64 * GOLDEN).fract() - 0.5);

@@ -175,8 +175,8 @@ impl Cloud {
         }
     }
 
-    /// Width of a pixel on the ground, along the image's rows and columns `[m/px]`; a camera's where it looks straight ahead,
-    /// longer along its tilt.
+    /// Width of a pixel on the ground, along the image's rows and columns `[m/px]`; a camera's where it looks straight
+    /// ahead, longer along its tilt.
     pub(super) fn resolution(&self, plane: &PlaneFit) -> (f64, f64) {
         match self.footprint {
             Footprint::Column { x, y } => (x, y),

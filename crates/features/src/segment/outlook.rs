@@ -13,8 +13,8 @@ const HEAP_HEIGHT: f64 = 2.0;
 /// Pixels of it, at least: a lone one may be a fault.
 pub(super) const HEAP_PIXELS: usize = 3;
 
-/// A pixel without data is in a hole if so many of the eight around it have none, or more; of a fifth that are missing at
-/// random one in a hundred is.
+/// A pixel without data is in a hole if so many of the eight around it have none, or more; of a fifth that are missing
+/// at random one in a hundred is.
 const BLIND_AROUND: usize = 4;
 
 impl Formation {
@@ -27,7 +27,8 @@ impl Formation {
         2.0 * least as f64 / self.width.min(self.height) as f64
     }
 
-    /// Share of the formation's volume that its largest patch holds: near 1 of a heap, little of scattered grains `[-]`.
+    /// Share of the formation's volume that its largest patch holds: near 1 of a heap, little of scattered grains
+    /// `[-]`.
     pub fn body_share(&self) -> f64 {
         let parts = self.patches_by_volume();
         let all: f64 = parts.iter().map(|(part, _)| part.volume).sum();
@@ -40,8 +41,8 @@ impl Formation {
         self.largest_patch().is_some_and(|patch| patch.into_iter().any(|pixel| depth(pixel) == 0))
     }
 
-    /// Share of the outline of the formation's largest patch beyond which nothing is seen: the edge of the image, a border
-    /// that is ignored, what is above the greatest height, and holes, but for single pixels `[-]`.
+    /// Share of the outline of the formation's largest patch beyond which nothing is seen: the edge of the image, a
+    /// border that is ignored, what is above the greatest height, and holes, but for single pixels `[-]`.
     pub fn hidden_share(&self) -> f64 {
         let Some(patch) = self.largest_patch() else { return 0.0 };
         let (width, height) = (self.width as isize, self.height as isize);
@@ -126,7 +127,8 @@ mod tests {
     const SIDE: usize = 80;
     const DIAMETER: f64 = 4e-3;
 
-    /// Cones on level ground of 2 mm to a pixel: middle `[px]`, height and radius `[m]`; the first columns have no data.
+    /// Cones on level ground of 2 mm to a pixel: middle `[px]`, height and radius `[m]`; the first columns have no
+    /// data.
     fn seen(cones: &[([f64; 2], f64, f64)], blind: usize) -> Formation {
         let height_threshold = Threshold::Absolute(1e-3);
         let settings = Segmentation { height_threshold, ..Segmentation::default() };

@@ -8,56 +8,10 @@ use crate::error::{FeatureError, require_in};
 use crate::region::Region;
 use granulcal_scene::{CameraSpec, Mask};
 
+use super::threshold::Threshold;
+
 /// Largest length `[m]` that a setting may have.
 const MAX_LENGTH: f64 = 1e3;
-
-/// Robust standard deviations of the ground that a patch of grains must reach. Five would do for noise
-/// that is the same all over the image; at its edge it is up to a quarter larger.
-const PEAK_SDS: f64 = 6.0;
-
-/// Height above the ground from which a pixel counts as grain.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Threshold {
-    /// This height `[m]`.
-    Absolute(f64),
-    /// Three robust standard deviations of the ground about its plane, but at least the floor:
-    /// what the sensor can tell from the ground. A patch must reach six of them somewhere, for
-    /// one pixel in 740 of Gaussian noise is above three, and correlated noise makes patches of them.
-    Automatic {
-        /// Least threshold `[m]`.
-        floor: f64,
-    },
-}
-
-impl Default for Threshold {
-    /// Automatic with a floor of 1 mm, a quarter of the paper's 4 mm grains: one layer is kept.
-    fn default() -> Self {
-        Self::Automatic { floor: 0.001 }
-    }
-}
-
-impl Threshold {
-    /// Robust standard deviations of the ground that an automatic threshold is above it: one pixel in 740 of Gaussian
-    /// noise is taken for a grain by itself.
-    pub const ABOVE_NOISE: f64 = 3.0;
-
-    /// The height `[m]` for a ground of the given roughness `[m]`.
-    pub(super) fn height(self, ground_sd: f64) -> f64 {
-        match self {
-            Self::Absolute(height) => height,
-            Self::Automatic { floor } => floor.max(Self::ABOVE_NOISE * ground_sd),
-        }
-    }
-
-    /// The height `[m]` that a patch of grains must reach somewhere; a fixed threshold asks for none.
-    pub(super) fn peak(self, ground_sd: f64) -> Option<f64> {
-        match self {
-            Self::Absolute(_) => None,
-            Self::Automatic { floor } => Some(floor.max(PEAK_SDS * ground_sd)),
-        }
-    }
-}
 
 /// How an image is segmented. The default suits an overhead depth camera at 0.3 m to 0.5 m.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -120,8 +74,8 @@ impl Default for Segmentation {
 }
 
 impl Segmentation {
-    /// These settings for a recording that is held against the images of a scene's camera: pixels as wide on the ground,
-    /// no more of the ground in view and, unless they state one, its threshold.
+    /// These settings for a recording that is held against the images of a scene's camera: pixels as wide on the
+    /// ground, no more of the ground in view and, unless they state one, its threshold.
     #[must_use]
     pub fn as_seen_by(&self, camera: &CameraSpec) -> Self {
         Self {
@@ -132,8 +86,9 @@ impl Segmentation {
         }
     }
 
-    /// These settings with the height from which the camera's images show grain as the floor of the automatic threshold,
-    /// which stays above the ground's noise; unless they state a threshold, or its images are told apart by colour.
+    /// These settings with the height from which the camera's images show grain as the floor of the automatic
+    /// threshold, which stays above the ground's noise; unless they state a threshold, or its images are told apart by
+    /// colour.
     #[must_use]
     pub fn at_threshold_of(&self, camera: &CameraSpec) -> Self {
         match camera.mask {
@@ -142,7 +97,8 @@ impl Segmentation {
         }
     }
 
-    /// These settings with an automatic threshold of at least `floor` `[m]`, unless they state another than the default.
+    /// These settings with an automatic threshold of at least `floor` `[m]`, unless they state another than the
+    /// default.
     #[must_use]
     pub fn with_scene_threshold(&self, floor: f64) -> Self {
         let height_threshold = match self.height_threshold {

@@ -15,7 +15,8 @@ const TOLERANCE: f64 = 0.12;
 const LEAST_GAPS: usize = 8;
 
 impl Cloud {
-    /// The step of the depths or heights `[m]`: all neighbouring ones are a whole number of it apart; 0 if there is none.
+    /// The step of the depths or heights `[m]`: all neighbouring ones are a whole number of it apart; 0 if there is
+    /// none.
     pub(super) fn step(&self) -> f64 {
         let stride = self.points.len().div_ceil(LOOKED_AT).max(1);
         let along = self.points.iter().step_by(stride).map(|point| match self.footprint {

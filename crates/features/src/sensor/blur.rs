@@ -3,8 +3,8 @@
 /// Half width of the kernel in standard deviations; the weight cut off is 6e-5 (scipy uses 4 too).
 const TRUNCATE: f64 = 4.0;
 
-/// Normalised convolution of a row-major field: G*(w f) / G*w with w = 1 where there is data and 0
-/// where there is NaN or no image, at the pixels that have data. `keep_going` is asked at every row: none when it says no.
+/// Normalised convolution of a row-major field: G*(w f) / G*w with w = 1 where there is data and 0 where there is NaN
+/// or no image, at the pixels that have data. `keep_going` is asked at every row: none when it says no.
 ///
 /// # Reference
 /// Knutsson & Westin 1993, doi:10.1109/CVPR.1993.341081.

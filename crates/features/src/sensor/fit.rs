@@ -66,8 +66,8 @@ pub struct SensorFit {
 /// Fits noise, fixed pattern, rounding and holes to frames of a flat surface.
 ///
 /// # Errors
-/// `NotFlat` and `Bump` for frames of something else, `TooFewPoints` when a region has hardly any data, `OutOfRange` for
-/// a setting or a region outside of the frames.
+/// `NotFlat` and `Bump` for frames of something else, `TooFewPoints` when a region has hardly any data, `OutOfRange`
+/// for a setting or a region outside of the frames.
 pub fn fit(frames: &FlatFrames, settings: &FitSettings) -> Result<SensorFit, FeatureError> {
     let session = Session::new(frames, settings)?;
     let (template, edge_holes) = template(frames, &session);

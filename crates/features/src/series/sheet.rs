@@ -1,7 +1,7 @@
 //! The front of a sheet that spreads about an axis, of its profile.
 
-/// The largest radius at which a surface over rings of width `ring` is at least `depth` high, linear between the middles of
-/// two rings `[m]`; `None` if it is nowhere.
+/// The largest radius at which a surface over rings of width `ring` is at least `depth` high, linear between the
+/// middles of two rings `[m]`; `None` if it is nowhere.
 pub fn sheet_radius(ring: f64, heights: &[f64], depth: f64) -> Option<f64> {
     let last = heights.iter().rposition(|&height| height >= depth)?;
     let (here, next) = (heights[last], heights.get(last + 1).copied().unwrap_or(0.0));

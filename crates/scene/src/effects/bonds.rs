@@ -1,8 +1,9 @@
 //! Bonds that break: what glues grains to their neighbours at the begin, and not again once it has broken.
 //!
-//! A pair is held by a steady pull F until its surfaces have parted, or slid past each other, by `range` from where they
-//! were nearest: the contact bond of a bonded-particle model (Potyondy and Cundall, Int. J. Rock Mechanics and Mining
-//! Sciences 41 (2004) 1329, doi:10.1016/j.ijrmms.2004.09.011) for rigid grains, which have no stiffness to part it by.
+//! A pair is held by a steady pull F until its surfaces have parted, or slid past each other, by `range` from where
+//! they were nearest: the contact bond of a bonded-particle model (Potyondy and Cundall, Int. J. Rock Mechanics and
+//! Mining Sciences 41 (2004) 1329, doi:10.1016/j.ijrmms.2004.09.011) for rigid grains, which have no stiffness to part
+//! it by.
 
 use serde::{Deserialize, Serialize};
 

@@ -86,8 +86,8 @@ impl Capillary {
         derjaguin / (1.0 + 1.05 * s + 2.5 * s * s)
     }
 
-    /// Work to part a bridge from `gap` until it ruptures, over the pull of touching typical grains times a radius `[-]`:
-    /// the integral of [`Capillary::pull`].
+    /// Work to part a bridge from `gap` until it ruptures, over the pull of touching typical grains times a radius
+    /// `[-]`: the integral of [`Capillary::pull`].
     pub fn work(&self, gap: f64, derjaguin: f64) -> f64 {
         // Of 1 / (1 + a s + b s^2) with 4 b > a^2: 2 / q atan((2 b s + a) / q), q^2 = 4 b - a^2.
         let (a, b): (f64, f64) = (1.05, 2.5);

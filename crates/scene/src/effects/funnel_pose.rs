@@ -2,8 +2,8 @@
 //!
 //! The funnel, with the grains that wait in it, is turned about the middle of its outlet and then moved aside; the
 //! ground and gravity stay. A pour lands beside the axis and, out of a funnel that leans, with a speed to the side.
-//! Sliding friction at the funnel, as a ratio to what it would be, slows the flow (Beverloo's rate) and decides whether a
-//! pour piles up or leaves a ring.
+//! Sliding friction at the funnel, as a ratio to what it would be, slows the flow (Beverloo's rate) and decides whether
+//! a pour piles up or leaves a ring.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};

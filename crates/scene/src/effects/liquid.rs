@@ -1,5 +1,5 @@
-//! A liquid with a flow of its own: it stands among the grains as a column about the z axis, and runs out over the ground.
-//! The equations are in `dem/src/liquid.rs` and docs/theory/effects.md.
+//! A liquid with a flow of its own: it stands among the grains as a column about the z axis, and runs out over the
+//! ground. The equations are in `dem/src/liquid.rs` and docs/theory/effects.md.
 
 use std::f64::consts::PI;
 
@@ -72,8 +72,8 @@ impl Effect for Liquid {
 }
 
 impl Liquid {
-    /// Height by which menisci between packed grains of a `diameter` `[m]` draw the liquid up, `6 gamma (1 - eps) / (eps d
-    /// rho_f g)` with eps = 0.4 between them, which it wets `[m]`.
+    /// Height by which menisci between packed grains of a `diameter` `[m]` draw the liquid up, `6 gamma (1 - eps) /
+    /// (eps d rho_f g)` with eps = 0.4 between them, which it wets `[m]`.
     ///
     /// Source: tension times the surface of the grains over the volume between them, Haines, J. Agricultural Science 20
     /// (1930) 97, doi:10.1017/S002185960008864X.

@@ -14,8 +14,8 @@
 //! F_t = shear 6 pi mu r_i Y ln(s / max(h, h_0)) u_t,   Y = 4 b (2 + b + 2 b^2) / (15 (1 + b)^3),   b = r_j / r_i
 //! ```
 //!
-//! with s the mean radius: pi mu a ln(a / h) u_t for equal spheres, (16/5) pi mu a ln(a / h) u_t at a wall (Y = 8/15, s =
-//! a). It acts at the surfaces, so that what rolls as gears do is not resisted.
+//! with s the mean radius: pi mu a ln(a / h) u_t for equal spheres, (16/5) pi mu a ln(a / h) u_t at a wall (Y = 8/15, s
+//! = a). It acts at the surfaces, so that what rolls as gears do is not resisted.
 //!
 //! Source: Reynolds' equation in the limit of a thin film, Kim and Karrila, Microhydrodynamics (1991), chapter 9 (Y is
 //! their Y^A_11, section 9.3); Ball and Melrose, Physica A 247 (1997) 444, doi:10.1016/S0378-4371(97)00412-3; with

@@ -2,8 +2,8 @@
 //!
 //! `d_i = d exp(s z_i - 3/2 s^2)` with `s^2 = ln(1 + cv^2)` and z normal, cut off at |z| = 2.5. The mean volume is that
 //! of grains of diameter d for the uncut distribution, so the pour's mass stays what it is but for what the cut takes:
-//! 2 % at a cv of 0.2, 6 % at 0.35, 13 % at 0.5, the largest that is taken. A list is scaled by nothing: its diameters are
-//! what they are. Masses go with the cube.
+//! 2 % at a cv of 0.2, 6 % at 0.35, 13 % at 0.5, the largest that is taken. A list is scaled by nothing: its diameters
+//! are what they are. Masses go with the cube.
 
 use granulcal_numbers::{box_muller, half_open};
 use rand_core::{Rng, SeedableRng};

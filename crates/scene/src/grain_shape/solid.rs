@@ -158,7 +158,8 @@ impl Solid {
         })
     }
 
-    /// Points whose hull it is, in its own axes `[m]`: its corners, or as many points as asked for on each rim of a cylinder.
+    /// Points whose hull it is, in its own axes `[m]`: its corners, or as many points as asked for on each rim of a
+    /// cylinder.
     pub fn vertices(&self, on_rim: usize) -> Vec<Vector3<f64>> {
         let Some((radius, half)) = self.round else { return self.corners.clone() };
         let at = |number: usize, y: f64| {
@@ -193,8 +194,8 @@ impl Solid {
         }
     }
 
-    /// How far a point of its own axes is above the face that it is highest over, negative inside `[m]`; and that face's
-    /// outward unit normal.
+    /// How far a point of its own axes is above the face that it is highest over, negative inside `[m]`; and that
+    /// face's outward unit normal.
     pub fn height(&self, point: &Vector3<f64>) -> (f64, Vector3<f64>) {
         self.height_over(point, |_| true)
     }

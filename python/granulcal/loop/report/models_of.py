@@ -1,5 +1,7 @@
 """The models of a closed loop, as `models.json` keeps them."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +16,7 @@ from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, Task
 from granulcal.loop.test.trace import Explanation, Trace
 
-__all__ = ["models_of"]
+__all__ = ["models_of", "scatter_of"]
 
 Array = NDArray[np.float64]
 
@@ -43,12 +45,8 @@ def models_of(
         simulated: of the base and of the verdict's model, by condition's name.
     """
     fitted = task.of(FIT)
-    scatter = []
-    for condition in fitted:
-        rows = measured[condition.name]
-        # One pour borrows the scatter of simulated ones.
-        rows = rows if len(rows) > 1 else simulated[condition.name].base
-        scatter.append(rows.std(axis=0, ddof=1))
+    # One pour borrows the scatter of simulated ones.
+    rows = [one if len(one := measured[c.name]) > 1 else simulated[c.name].base for c in fitted]
     return Models(
         scene=task.at_first(),
         verdict=verdict,
@@ -64,7 +62,7 @@ def models_of(
         correction=Discrepancy.of(found.local, found.base_fit),
         known=np.array([plan.unit(c.at) for c in fitted]).reshape(len(fitted), -1),
         means=np.array([measured[c.name].mean(axis=0) for c in fitted]),
-        scatter=np.array(scatter),
+        scatter=scatter_of(rows, surrogate.raw_spread),
         pours=np.array([float(len(measured[c.name])) for c in fitted]),
         coarse=task.coarse,
         engine=None if (engine := engine_in_use()) is None else engine.name,
@@ -77,6 +75,21 @@ def _shared(task: Task) -> dict[str, float]:
     """Numbers that every condition states, and each the same."""
     first, *others = (condition.at for condition in task.conditions)
     return {p: v for p, v in first.items() if all(at[p] == v for at in others)}
+
+
+def scatter_of(rows: Sequence[Array], spread: Array) -> Array:
+    """Returns the standard deviation of one pour under each condition, shape (H, s).
+
+    Where fewer than two pours tell it, it is the mean of the others, else that of the archive.
+
+    Args:
+        rows: pours of each condition, shape (n, s) each.
+        spread: of the archive, infinite where nothing varies, shape (s,).
+    """
+    variances = [one.var(axis=0, ddof=1) for one in rows if len(one) > 1]
+    wide = np.where(np.isfinite(spread), spread, 0.0)
+    borrowed = np.sqrt(np.mean(variances, axis=0)) if variances else wide
+    return np.array([one.std(axis=0, ddof=1) if len(one) > 1 else borrowed for one in rows])
 
 
 def _makers(task: Task, plan: ArchivePlan, found: Trace, one: Explanation) -> tuple[Maker, ...]:

@@ -5,6 +5,7 @@ use granulcal_dataset::{Form, Product};
 use granulcal_features::Region;
 
 use crate::args::ReadArgs;
+use crate::args::numbers::{number, whole};
 use crate::args::paths::{Reads, Writes, recording, writes};
 
 /// Segment and describe a measured recording
@@ -45,26 +46,26 @@ pub struct FeaturesArgs {
     #[command(flatten)]
     pub read: ReadArgs,
     /// Height above the ground from which a pixel counts as grain [m]
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = number, allow_negative_numbers = true)]
     pub threshold: Option<f64>,
     /// Ignore a frame of so many pixels
-    #[arg(long, value_name = "PIXELS")]
+    #[arg(long, value_name = "PIXELS", value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub border: Option<usize>,
     /// Look at this part of the image alone: the floor of a tray, without its rim and the table
     #[arg(long, value_name = "X,Y,WIDTH,HEIGHT")]
     pub region: Option<Region>,
     /// Keep the middle pixel of every n x n block
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub downsample: Option<usize>,
     /// See it as this scene's images are seen, a pixel as wide on the ground and no more ground in view, and say what
     /// makes it doubtful as a formation of the scene: a TOML, or `funnel` or `drop`
     #[arg(long, value_name = "SCENE", conflicts_with = "downsample")]
     pub scene: Option<Reads>,
     /// Height above which a pixel is a fault and no data [m]
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = number, allow_negative_numbers = true)]
     pub max_height: Option<f64>,
     /// Grains must form patches of at least so many pixels
-    #[arg(long, value_name = "PIXELS")]
+    #[arg(long, value_name = "PIXELS", value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub min_component: Option<usize>,
     /// Write the points of the formation [m] as an array (n, 3)
     #[arg(long, value_name = "OUT.npy", value_parser = writes(Product::File(Form::Npy)))]
@@ -80,7 +81,7 @@ pub struct FeaturesArgs {
     #[arg(long)]
     pub diagnostics: bool,
     /// Diameter of a grain [m], which the diagnostic statistics need
-    #[arg(long, value_name = "METRES", requires = "diagnostics")]
+    #[arg(long, value_name = "METRES", requires = "diagnostics", value_parser = number, allow_negative_numbers = true)]
     pub grain_diameter: Option<f64>,
     /// Where the axis of the pour meets the levelled ground [m], in the frame of the centroid that is
     /// printed [default: the centroid]

@@ -5,7 +5,7 @@ use granulcal_dataset::{Form, Product};
 use granulcal_features::Region;
 
 use crate::args::ReadArgs;
-use crate::args::numbers::seed;
+use crate::args::numbers::{number, seed, whole};
 use crate::args::paths::{Reads, Writes, recording, writes};
 
 /// Fit a depth camera's noise, fixed pattern, rounding and holes to frames of a flat surface
@@ -51,22 +51,22 @@ pub struct FitSensorArgs {
     #[command(flatten)]
     pub read: ReadArgs,
     /// Distance of the two imagers of a stereo camera [m]
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = number, allow_negative_numbers = true)]
     pub baseline: Option<f64>,
     /// Part of the frames that is flat; repeat as needed [default: the whole frame]
     #[arg(long = "region", value_name = "X,Y,WIDTH,HEIGHT")]
     pub regions: Vec<Region>,
     /// Degree of the polynomial that is removed from the surface; 1 is a plane
-    #[arg(long, default_value_t = 2, value_name = "DEGREE")]
+    #[arg(long, default_value_t = 2, value_name = "DEGREE", value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub trend: usize,
     /// Longest distance of the autocorrelation [px]
-    #[arg(long, default_value_t = 24, value_name = "PIXELS")]
+    #[arg(long, default_value_t = 24, value_name = "PIXELS", value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub max_lag: usize,
     /// Maps were cut from the sensor's image up to so many pixels apart
-    #[arg(long, default_value_t = 0, value_name = "PIXELS")]
+    #[arg(long, default_value_t = 0, value_name = "PIXELS", value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub max_shift: usize,
     /// Sessions that are simulated to correct and judge the fit
-    #[arg(long, default_value_t = 24, value_name = "N")]
+    #[arg(long, default_value_t = 24, value_name = "N", value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub sessions: usize,
     /// Seed of the simulated sessions
     #[arg(long, default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]

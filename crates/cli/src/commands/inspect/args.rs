@@ -4,6 +4,7 @@ use clap::Args;
 use granulcal_dataset::{Form, Product};
 
 use crate::args::SceneChanges;
+use crate::args::numbers::{number, whole};
 use crate::args::paths::{Reads, Writes, writes};
 
 /// Say what is in a scene, prior, data set, recording or MCAP file, or in one substep of a scene
@@ -45,10 +46,10 @@ pub struct InspectArgs {
 #[derive(Clone, Debug, Args)]
 pub struct SubstepArgs {
     /// Simulated time at which the substep begins [s]
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = number, allow_negative_numbers = true)]
     pub time: Option<f64>,
     /// Seed of the grains' jitter at the start [default: 0]
-    #[arg(long)]
+    #[arg(long, value_parser = whole::<u64>, allow_negative_numbers = true)]
     pub seed: Option<u64>,
     #[command(flatten)]
     pub with: SceneChanges,

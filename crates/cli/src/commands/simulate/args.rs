@@ -6,7 +6,7 @@ use clap::Args;
 use granulcal_dataset::{Form, Product};
 
 use crate::args::SceneArgs;
-use crate::args::numbers::{period, positive, seed};
+use crate::args::numbers::{period, positive, seed, whole};
 use crate::args::paths::{Reads, Writes, kept, writes};
 
 /// Simulate one pour: status, health and statistics
@@ -39,7 +39,7 @@ pub struct SimulateArgs {
     #[arg(long, default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]
     pub seed: u64,
     /// Cores for the one pour; only very large scenes gain, and none changes by a bit
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub threads: usize,
     /// Print one JSON object
     #[arg(long)]

@@ -17,7 +17,8 @@ fn kept(exam: &Exam) -> [Vector3<f64>; 2] {
     [linear, angular]
 }
 
-/// Two bodies fly at each other, spinning and passing aside: at random places in a substep, so that the gap is anything.
+/// Two bodies fly at each other, spinning and passing aside: at random places in a substep, so that the gap is
+/// anything.
 #[test]
 fn two_bodies_that_collide_keep_their_angular_momentum() {
     let brick = GrainShape::Box { aspect: [1.0, 2.0, 3.0] };

@@ -26,9 +26,8 @@ fn edge(flow: &RadialFlow, least: f64) -> f64 {
 
 #[test]
 fn a_paraboloid_stays_one_and_spreads_as_it_must() {
-    // h = h_0 (R_0 / R)^2 (1 - r^2 / R^2) and u = r R' / R solve the equations without friction if R'' = 2 g h_0 R_0^2 /
-    // R^3, that is R^2 = R_0^2 + 2 g h_0 t^2; of a flat one, which sinks
-    // slowly.
+    // h = h_0 (R_0 / R)^2 (1 - r^2 / R^2) and u = r R' / R solve the equations without friction if R'' = 2 g h_0 R_0^2
+    // / R^3, that is R^2 = R_0^2 + 2 g h_0 t^2; of a flat one, which sinks slowly.
     let (radius, height, time) = (0.1, 0.005, 0.6);
     let mut flow = shaped(1e-3, 100, |r| height * (1.0 - (r / radius).powi(2)));
     let before = flow.volume();
@@ -93,8 +92,8 @@ fn solids_lift_the_surface_and_liquid_at_rest_stays() {
 
 #[test]
 fn a_gap_below_a_tube_lets_out_what_a_sluice_does() {
-    // A wide column, so that its level falls little: c a sqrt(2 g h) over a length of gap, c = 0.61 of a free outflow from
-    // below a sharp edge (Henry 1950); here the gap is one ring's jet without contraction.
+    // A wide column, so that its level falls little: c a sqrt(2 g h) over a length of gap, c = 0.61 of a free outflow
+    // from below a sharp edge (Henry 1950); here the gap is one ring's jet without contraction.
     let (height, gap) = (0.05, 5e-3);
     let mut flow = RadialFlow::at_rest(2e-3, 100, height, &Solids::default());
     let half_open = Ground { gate: Some((100, gap)), ..ground(0.0, 0.0) };

@@ -26,8 +26,8 @@ const BEYOND_PIXELS: f64 = 2.0;
 /// Independent tiles from which their deviation is known well, and below which it is not known at all.
 const MANY_TILES: f64 = 60.0;
 const FEWEST_TILES: f64 = 20.0;
-/// Draws of as many tiles as the trend has coefficients; one of them has no tile of a mound of a third of the frame with
-/// a probability of 1 - 1e-17 for a trend of degree 2.
+/// Draws of as many tiles as the trend has coefficients; one of them has no tile of a mound of a third of the frame
+/// with a probability of 1 - 1e-17 for a trend of degree 2.
 const DRAWS: usize = 500;
 /// Standard deviations from the surface beyond which a tile has no say where it lies.
 const CLIP: f64 = 4.0;

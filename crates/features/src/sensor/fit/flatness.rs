@@ -5,9 +5,9 @@ use serde::Serialize;
 use crate::error::FeatureError;
 
 /// Least share of the pixels with data that lie on the surface, and the same where bumps cannot be told from the noise;
-/// largest standard deviation from it over the distance (of height maps: over the longer side). Of Gaussian errors 0.006 %
-/// are off it, of those of measured cameras 1 %. A depth camera errs by some 2 % of the distance; a room is no wall.
-/// docs/results/reliability.md holds them against measured and rendered frames.
+/// largest standard deviation from it over the distance (of height maps: over the longer side). Of Gaussian errors
+/// 0.006 % are off it, of those of measured cameras 1 %. A depth camera errs by some 2 % of the distance; a room is no
+/// wall. docs/results/reliability.md holds them against measured and rendered frames.
 const LEAST_ON_SURFACE: f64 = 0.9;
 const LEAST_WITHOUT_BUMP: f64 = 0.97;
 const LARGEST_DEVIATION: f64 = 0.05;

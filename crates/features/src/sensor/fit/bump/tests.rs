@@ -12,7 +12,8 @@ fn correlated(correlated: f64, correlation_x: f64, correlation_y: f64) -> NoiseF
     NoiseField { correlated, correlation_x, correlation_y, ..NoiseField::default() }
 }
 
-/// Sizes and noise of regions of a D435 (wall and boards, as if in metres), of a Kinect v2, of white noise and of broad.
+/// Sizes and noise of regions of a D435 (wall and boards, as if in metres), of a Kinect v2, of white noise and of
+/// broad.
 fn flat_frames() -> Vec<(usize, usize, NoiseField)> {
     let wall =
         NoiseField { broad: 0.081, broad_x: 24.0, broad_y: 6.7, ..correlated(0.141, 7.8, 5.3) };
@@ -119,8 +120,9 @@ fn mound(
     ((0..width * height).map(at).collect(), (x as usize, y as usize))
 }
 
-/// Tries mounds of a height that cover 2 to 20 % of a view, of which the noise is that of a D435 at 0.4 m and of a Kinect
-/// v2: tries, how many are missed and how many could not be judged. What is found is where the mound is, and as high.
+/// Tries mounds of a height that cover 2 to 20 % of a view, of which the noise is that of a D435 at 0.4 m and of a
+/// Kinect v2: tries, how many are missed and how many could not be judged. What is found is where the mound is, and as
+/// high.
 fn try_mounds(top: f64, seeds: u64) -> (usize, usize, usize) {
     let (mut tries, mut missed, mut unknown) = (0, 0, 0);
     for (width, height, field) in [(160, 120, correlated(1.4e-3, 3.0, 2.5)), flat_frames()[2]] {
