@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.check.alarms import (
+    of_base_fit,
     of_ends,
     of_error,
     of_labels,
@@ -53,6 +54,15 @@ def test_a_name_with_which_the_error_grows_is_said_to() -> None:
     assert of_error(NAMED, nil, better) == ()
     # Where nothing is named both models are one.
     assert of_error(NONE, worse, worse) == ()
+
+
+def test_a_name_is_told_where_the_base_models_fit_is_not_its_best() -> None:
+    rules = Thresholds()
+    (told,) = of_base_fit(NAMED, 2.5e-4, rules)
+    assert "p = 0.00025" in told and "may be less" in told
+    assert of_base_fit(NAMED, 0.4, rules) == of_base_fit(NONE, 2.5e-4, rules) == ()
+    # Too few usable pours of the base model tell nothing.
+    assert of_base_fit(NAMED, float("nan"), rules) == ()
 
 
 def test_an_error_that_is_left_of_an_explanation_is_said() -> None:

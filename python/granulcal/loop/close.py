@@ -21,6 +21,7 @@ from granulcal.files import write_beside
 from granulcal.loop.analysis import Analysis
 from granulcal.loop.call import check_call
 from granulcal.loop.check.alarms import (
+    of_base_fit,
     of_ends,
     of_error,
     of_labels,
@@ -215,6 +216,7 @@ def close_loop(
     alarms = of_error(verdict, fit, sealed) + of_placebo(placebo.verdict, rules)
     alarms += of_left(verdict, fit, sealed) + of_rows(standing) + told_unseen(poured)
     alarms += of_ends(verdict, found.best, task) + of_untried(verdict, task.untried)
+    alarms += of_base_fit(verdict, settled.at_base, rules)
     if fit.total_before.interval[0] > 0:
         fitted = {c.name: measured[c.name] for c in analysis.fitted}
         spread = surrogate.raw_spread[: Measures.of(task.scene).head]

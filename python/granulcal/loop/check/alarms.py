@@ -16,6 +16,7 @@ from granulcal.loop.test.trace import Explanation
 from granulcal.loop.test.verdict import NAMING, Verdict
 
 __all__ = [
+    "of_base_fit",
     "of_ends",
     "of_error",
     "of_labels",
@@ -42,6 +43,23 @@ def of_placebo(placebo: Verdict, rules: Thresholds) -> tuple[str, ...]:
         f"the same analysis of as many pours of the base model at its fit says {placebo.kind} (p = "
         f"{placebo.p:.2g}; {placebo.reason}), where there is nothing to be found: the surrogate is "
         "wrong there by as much, and a verdict has to be far more probable than that",
+    )
+
+
+def of_base_fit(verdict: Verdict, at_base: float, rules: Thresholds) -> tuple[str, ...]:
+    """Returns what is to be said of an error before that is not of the base model's best fit.
+
+    Args:
+        verdict: the word.
+        at_base: p of fresh pours of the base model at its fit.
+        rules: what was fixed beforehand.
+    """
+    if verdict.kind not in NAMING or not at_base <= rules.confirm:
+        return ()
+    return (
+        f"the surrogate is wrong at the base model's fit (p = {at_base:.2g} of fresh pours), also "
+        "after all rounds that held it there: the base model may be nearer to the data elsewhere, "
+        "and what the effect takes away of the error may be less",
     )
 
 

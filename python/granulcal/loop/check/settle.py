@@ -50,6 +50,7 @@ class Settled:
         surrogate: that surrogate.
         simulated: pours of both models at their fits, by name of the condition to fit.
         confirmed: p of the pours of the verdict's model; NaN where too few are usable.
+        at_base: p of those of the base model, that of the verdict's where it is the same.
         anchors: how often the surrogate was moved.
         seed: of the pours.
         before: pours of the rounds before the last.
@@ -59,6 +60,7 @@ class Settled:
     surrogate: Surrogate
     simulated: dict[str, ModelPours]
     confirmed: float
+    at_base: float
     anchors: int
     seed: int
     before: int
@@ -85,7 +87,7 @@ def settle(
         say(f"fresh pours of the verdict's model: the surrogate is right with {where}")
         is_wrong = right <= rules.confirm or at_base <= rules.confirm
         if number == ANCHORS or not of_base or not of_best or not is_wrong:
-            return Settled(found, surrogate, simulated, right, number, own, before)
+            return Settled(found, surrogate, simulated, right, at_base, number, own, before)
         fits = [(base, of_base)] if fit is base else [(base, of_base), (fit, of_best)]
         surrogate = anchored(surrogate, fits)
         before += sum(two.pours for two in simulated.values())
