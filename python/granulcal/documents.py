@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 __all__ = [
+    "ENCODING",
     "LARGEST_DOCUMENT",
     "Flag",
     "ListOf",
@@ -42,8 +43,8 @@ _LARGEST_FILE = 4 << 30
 # No quantity of this program is larger, and squares of these are finite.
 _LARGEST_NUMBER = 1e100
 _SHOWN = 60
-# Some editors put a mark before the text, which readers of TOML in Rust skip, too.
-_ENCODING = "utf-8-sig"
+ENCODING = "utf-8-sig"
+"""Of text that people write: some editors put a mark before it, which is skipped in Rust, too."""
 
 
 class Schema(Protocol):
@@ -260,7 +261,7 @@ def parse_json(data: bytes, where: Path | str, *, error: type[ValueError] = Valu
         raise ValueError(f"{word} is no number")
 
     try:
-        return json.loads(data.decode(_ENCODING), parse_constant=refuse)
+        return json.loads(data.decode(ENCODING), parse_constant=refuse)
     except RecursionError:
         raise error(f"{where} is nested too deeply") from None
     except ValueError as reason:
@@ -287,7 +288,7 @@ def parse_toml(data: bytes, where: Path | str, *, error: type[ValueError] = Valu
         ValueError: of the kind `error`; names the file.
     """
     try:
-        return tomllib.loads(data.decode(_ENCODING))
+        return tomllib.loads(data.decode(ENCODING))
     except RecursionError:
         raise error(f"{where} is nested too deeply") from None
     except ValueError as reason:

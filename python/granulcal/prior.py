@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.bayessim.arrays import as_matrix, known
-from granulcal.documents import LARGEST_DOCUMENT, read_bytes
+from granulcal.documents import ENCODING, LARGEST_DOCUMENT, read_bytes
 from granulcal.errors import PriorError
 from granulcal.parameter import Parameter
 from granulcal.real import check_real
@@ -121,7 +121,7 @@ class Prior:
             PriorError: the file is not a prior; the message begins with the file's name.
         """
         try:
-            return cls.from_toml(read_bytes(path, most=LARGEST_DOCUMENT).decode("utf-8-sig"))
+            return cls.from_toml(read_bytes(path, most=LARGEST_DOCUMENT).decode(ENCODING))
         except (PriorError, UnicodeDecodeError) as error:
             raise PriorError(f"{path}: {error}") from None
 

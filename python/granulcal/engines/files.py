@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.arrays import read_array
-from granulcal.documents import read_bytes
+from granulcal.documents import ENCODING, read_bytes
 
 __all__ = ["read_grains"]
 
@@ -51,7 +51,7 @@ def _table(path: Path) -> Array:
 
 def _csv(path: Path) -> Array:
     """Returns x, y, z and perhaps radius by the names in the first line."""
-    text = read_bytes(path).decode("utf-8-sig", "replace")
+    text = read_bytes(path).decode(ENCODING, "replace")
     first, _, rest = text.lstrip().partition("\n")
     names = [word.strip(" \t\r\"'").lower() for word in first.lstrip("# ").split(",")]
     wanted = [*_PLACES, "radius"] if "radius" in names else list(_PLACES)

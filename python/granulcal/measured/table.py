@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
 
+from granulcal.documents import ENCODING
+
 __all__ = ["rows_of"]
 
 
@@ -15,7 +17,7 @@ def rows_of(path: str | PathLike[str]) -> Iterator[list[str]]:
         OSError: it cannot be read.
         ValueError: it is no table; names the file.
     """
-    with Path(path).open(newline="", encoding="utf-8-sig", errors="replace") as file:
+    with Path(path).open(newline="", encoding=ENCODING, errors="replace") as file:
         try:
             yield from csv.reader(file)
         except csv.Error as error:

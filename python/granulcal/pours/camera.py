@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
 from granulcal.arrays import unmasked
-from granulcal.documents import LARGEST_DOCUMENT, read_bytes
+from granulcal.documents import ENCODING, LARGEST_DOCUMENT, read_bytes
 from granulcal.pours.statistics import as_points
 from granulcal.real import check_finite, check_real
 from granulcal.whole import check_seed, check_whole
@@ -69,7 +69,7 @@ class Camera:
         """
         check_real("height", height)
         try:
-            text = read_bytes(path, most=LARGEST_DOCUMENT).decode("utf-8-sig")
+            text = read_bytes(path, most=LARGEST_DOCUMENT).decode(ENCODING)
             table = tomllib.loads(text)
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{path}: not valid TOML: {error}") from None
