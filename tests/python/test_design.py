@@ -159,7 +159,7 @@ def test_radii_that_no_height_gives_are_refused(line):
         gc.design_rings(line, [_at(0.05)], tolerance=0)
 
 
-@pytest.mark.parametrize(("outer", "inner"), [(-0.1, None), (0.05, 0.06), (0.05, 0.0)])
+@pytest.mark.parametrize(("outer", "inner"), [(-0.1, None), (73, None), (0.05, 0.06), (0.05, 0.0)])
 def test_a_ring_that_cannot_be(outer, inner):
     with pytest.raises(ValueError, match=r"must (be a positive radius|lie between)"):
         gc.Ring(outer=outer, inner=inner)

@@ -142,7 +142,7 @@ impl Header {
         };
         let difference = self.scene.first_difference(&given.scene);
         if let Some((key, found, given)) = difference.map_err(DatasetError::refused)? {
-            return differs(format!("scene.{key}"), found, given);
+            return differs(named(&key), found, given);
         }
         if self.prior != given.prior {
             let (found, given) = (describe(&self.prior), describe(&given.prior));
@@ -173,6 +173,14 @@ fn law_of_draws(scene: &Scene, prior: &Prior) -> u32 {
     let effects = draws.filter(|(path, _)| path.starts_with("effects."));
     let with = |scene: Scene, (path, value): (&str, f64)| scene.with(path, value).unwrap_or(scene);
     law_of(&effects.fold(scene.clone(), with))
+}
+
+/// What a person calls a key of the scene: a mesh differs by the hash of its file.
+fn named(key: &str) -> String {
+    match key.strip_suffix(".shape.hash") {
+        Some(wall) => format!("the mesh of scene.{wall} (the hash of its file)"),
+        None => format!("scene.{key}"),
+    }
 }
 
 fn law_text(law: Option<u32>) -> String {
@@ -223,6 +231,7 @@ mod tests {
         let changed = scene.with("material.restitution", 0.3).unwrap();
         let text = message(Header::new(&changed, &prior, 1).unwrap());
         assert!(text.contains("scene.material.restitution is 0.5, but 0.3 is given"), "{text}");
+        assert_eq!(named("walls.0.shape.hash"), "the mesh of scene.walls.0 (the hash of its file)");
         let text = message(Header::new(&scene, &prior, 2).unwrap());
         assert!(text.contains("the seed is 1, but 2 is given"), "{text}");
         let text = message(Header { law: None, ..header.clone() });

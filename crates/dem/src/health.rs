@@ -197,14 +197,15 @@ impl HealthWatch {
         self.energy.is_finite()
     }
 
-    pub fn health(&self, substeps: usize) -> Health {
+    /// Of grains of so many spheres each, of which one is enough to be lost.
+    pub fn health(&self, substeps: usize, members: usize) -> Health {
         let mean = |sum: f64, samples: usize| sum / samples.max(1) as f64;
         Health {
             worst_penetration: self.worst_penetration,
             mean_residual: mean(self.residual_sum, self.residual_samples),
             worst_residual: self.worst_residual,
             energy_created: self.energy_created(),
-            grains_lost: self.lost.iter().filter(|&&lost| lost).count(),
+            grains_lost: self.lost.chunks(members).filter(|grain| grain.contains(&true)).count(),
             substeps,
             sweeps: self.sweeps,
             unconverged: self.unconverged,
@@ -221,7 +222,7 @@ impl HealthWatch {
     /// Whether no bound is broken, of grains with corners or balls.
     pub fn is_healthy(&self, is_cornered: bool, max_penetration: f64) -> bool {
         let deepest = deepest_allowed(is_cornered, max_penetration);
-        self.is_finite() && self.health(0).beyond(deepest).is_empty()
+        self.is_finite() && self.health(0, 1).beyond(deepest).is_empty()
     }
 
     fn energy_created(&self) -> f64 {
@@ -235,6 +236,16 @@ impl HealthWatch {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_grain_of_several_spheres_is_lost_once() {
+        let (still, level) = (Energy::default(), Heights { sum: 0.0, lowest: 0.0 });
+        let mut watch = HealthWatch::new(6, &still, &level, 1.0);
+        for sphere in [0, 1, 5] {
+            watch.lost_mut()[sphere] = true;
+        }
+        assert_eq!([1, 2, 3, 6].map(|members| watch.health(0, members).grains_lost), [3, 2, 2, 1]);
+    }
 
     #[test]
     fn every_bound_that_is_broken_is_told() {

@@ -297,7 +297,7 @@ impl Simulation {
 
     /// The health so far.
     pub fn health(&self) -> Health {
-        self.watch.health(self.substep)
+        self.watch.health(self.substep, self.members())
     }
 
     /// What the impacts so far have cost and taken; a simulation that goes on from a checkpoint counts afresh.

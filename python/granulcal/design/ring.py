@@ -13,6 +13,9 @@ PERCENTILES: tuple[float, float] = (5.0, 50.0)
 STATISTICS: tuple[str, ...] = tuple(f"radius[{p:g}]" for p in PERCENTILES)
 """Names of the two statistics in a data set."""
 
+_WIDEST = 10.0
+"""Outer radius beyond which a number is taken for millimetres [m]."""
+
 
 @dataclass(frozen=True)
 class Ring:
@@ -40,8 +43,11 @@ class Ring:
         check_real("outer", self.outer)
         if self.inner is not None:
             check_real("inner", self.inner)
-        if not (np.isfinite(self.outer) and self.outer > 0):
-            raise ValueError(f"outer must be a positive radius [m], got {self.outer}")
+        # A number in millimetres is refused before hundreds of pours, not after them.
+        if not (np.isfinite(self.outer) and 0 < self.outer <= _WIDEST):
+            raise ValueError(
+                f"outer must be a positive radius [m] of at most {_WIDEST:g}, got {self.outer}"
+            )
         if self.inner is not None and not 0 < self.inner < self.outer:
             raise ValueError(
                 f"inner must lie between 0 and outer = {self.outer} m, got {self.inner}"

@@ -99,7 +99,7 @@ impl Simulation {
     }
 
     /// Spheres of a grain: one, unless it is several.
-    fn members(&self) -> usize {
+    pub(super) fn members(&self) -> usize {
         self.clumps.as_ref().map_or(1, Clumps::members)
     }
 
