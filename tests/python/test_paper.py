@@ -28,7 +28,7 @@ from granulcal.experiments.paper.common.measure import (
 from granulcal.experiments.paper.common.outcome import Outcome, Row
 from granulcal.experiments.paper.common.page import write_page, write_tables
 from granulcal.experiments.paper.common.sizes import FULL, MEDIUM, QUICK, TINY
-from granulcal.experiments.paper.common.workshop import Workshop
+from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.experiments.paper.heights import SHIPPED as RECORDINGS
 from granulcal.experiments.paper.heights import Recordings
 from granulcal.experiments.paper.observation_error import _peaks
@@ -314,6 +314,30 @@ def test_tests_are_made_until_enough_are_usable(small_scene, small_prior, tmp_pa
     assert len(found) == 5 and shop.pours >= 5 and shop.seeds == {"tests": 3}
     part = found.of(found.names[2:4])
     np.testing.assert_array_equal(part.x, found.x[:, 2:4])
+
+
+def test_tests_of_sequences_are_counted_once(small_scene, small_prior, tmp_path, monkeypatch):
+    from granulcal.experiments.paper import sequence
+
+    def all_but_the_first(data):
+        kept = Pairs(data.theta[1:], data.x[1:], data.prior, data.x_names, data.left_out)
+        return {"last image": kept, "sequence": kept}
+
+    monkeypatch.setattr(sequence, "_both", all_but_the_first)
+    shop = Workshop(tmp_path, "sequence", TINY, threads=1, quiet=True)
+    found = sequence._tests(shop, small_scene, small_prior)
+    assert [len(each) for each in found.values()] == [TINY.tests] * 2
+    assert shop.pours == TINY.tests + 1
+
+
+def test_a_change_that_no_curve_shows_is_told_as_far_as_both_sides_were_poured(monkeypatch):
+    from granulcal.experiments.paper import propagation
+    from granulcal.pours.statistics import NAMES
+
+    values, x = np.linspace(0.0, 1.0, 5), np.ones((5, 3, len(NAMES)))
+    monkeypatch.setattr(propagation, "_RESAMPLES", 20)
+    row = propagation._row("q", "p", values, x, 0.75, [("max_z", lambda middle: np.array(0.1))])
+    assert row.ours == "more than ± 0.25"
 
 
 def test_a_change_that_no_curve_shows_is_beyond_the_range_without_a_warning(monkeypatch):

@@ -118,7 +118,8 @@ def _row(quantity: str, paper: str, values: Array, x: Array, at: float, wanted) 
     # Between two that are infinite there is no number, which is beyond the range as well.
     with np.errstate(invalid="ignore"):
         low, high = np.quantile(drawn, (0.025, 0.975))
-    reach = max(at - values[0], values[-1] - at)
+    # The nearer end: what is beyond it nobody has poured.
+    reach = min(at - values[0], values[-1] - at)
     told = f"more than ± {reach:.2g}" if not np.isfinite(best) else f"± {best:.2g}"
     top = f"{high:.2g}" if np.isfinite(high) else "beyond the range"
     interval = f"{low:.2g} to {top}" if np.isfinite(low) else "beyond the range"

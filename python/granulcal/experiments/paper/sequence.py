@@ -45,11 +45,7 @@ def run(workshop: Workshop) -> Outcome:
     size, prior = workshop.size, Prior.default()
     scene = _filmed(size.scene())
     training = _both(workshop.data("sequence-training", scene, prior, size.sequence, _SEED))
-    count, tests = size.tests, {}
-    while not tests or len(tests[_LAST]) < size.tests:
-        tests = _both(workshop.data("sequence-tests", scene, prior, count, _SEED + 1))
-        count += max(size.tests - len(tests[_LAST]), 0)
-    tests = {kind: pairs.first(size.tests) for kind, pairs in tests.items()}
+    tests = _tests(workshop, scene, prior)
     truth = tests[_LAST].theta
     errors, spreads, log_density, held = {}, {}, {}, {}
     for kind, pairs in training.items():
@@ -120,6 +116,18 @@ def run(workshop: Workshop) -> Outcome:
             f"Training pours that were not usable: {training[_LAST].unusable}.",
         ],
     )
+
+
+def _tests(workshop: Workshop, scene: Scene, prior: Prior) -> dict[str, Pairs]:
+    """As many usable tests as were asked for, by their last image and by all images."""
+    seen: dict[str, Pairs] = {}
+
+    def pour(count: int) -> Pairs:
+        seen.update(_both(workshop.data("sequence-tests", scene, prior, count, _SEED + 1)))
+        return seen[_LAST]
+
+    workshop.enough(workshop.size.tests, pour)
+    return {kind: pairs.first(workshop.size.tests) for kind, pairs in seen.items()}
 
 
 def _filmed(scene: Scene) -> Scene:
