@@ -1,6 +1,7 @@
 """The files of predictions: which rows they have, and what stands in them."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,8 @@ from granulcal.experiments.predictions.columns import column_rows
 from granulcal.experiments.predictions.drum import SPEEDS, drum_rows
 from granulcal.experiments.predictions.drum_base import SETTINGS, DrumBase
 from granulcal.experiments.predictions.model_error import ModelError
+from granulcal.loop.check.discrepancy import Discrepancy
+from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.models import Maker, Models
 from granulcal.pours.scene import Scene
 
@@ -151,6 +154,25 @@ def test_fronts_are_poured_for_every_test(tmp_path: Path, monkeypatch: pytest.Mo
         end = table[model, "a_08g", "end"]
         assert 10 < end[1] <= end[0] <= end[2] < 300
         assert sum(key[:2] == (model, "a_08g") for key in table) == 17
+
+
+def test_a_residual_of_beads_moves_no_front_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(columns, "_POURS", 2)
+    (tmp_path / "conditions.txt").write_text(TABLE)
+    wide, narrow = read_tests(tmp_path / "conditions.txt")
+    known = np.array([[0.0], [1.0]])
+    nothing = Discrepancy(known, np.empty(0), np.empty(0), np.empty((0, 0)))
+    scene, inputs = Scene.from_toml(SCENE), (("gravity.2", -39.24, -9.81),)
+    its = replace(models(scene, inputs, np.full((2, 4), 0.06)), correction=nothing)
+    forward, told = Forward(tmp_path / "pours", 1), list[str]()
+    rows = columns._corrected(its, wide, forward, told.append)
+    assert rows and not told
+    assert columns._corrected(its, narrow, forward, told.append) == []
+    assert told == [
+        "columns, corrected of c_06g: no prediction: the fits are of beads of 8 mm, got 6"
+    ]
 
 
 def test_a_model_is_as_wide_as_it_was_off_on_other_days() -> None:

@@ -10,7 +10,7 @@ are told from the other measured tests (`between_tests.py`) and need no closed l
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from math import sqrt
+from math import isclose, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -122,6 +122,10 @@ def _corrected(
     """At the times of the fitted conditions, scaled; between them linear."""
     there = {"gravity.2": -test.numbers["G"]}
     try:
+        # A residual knows the beads that it is of, and no others.
+        fitted, beads = models.scene.get("grains.diameter"), test.numbers["d_p"]
+        if not isclose(beads, fitted):
+            raise ValueError(f"the fits are of beads of {1e3 * fitted:g} mm, got {1e3 * beads:g}")
         prediction = models.predict("corrected", there, forward, pours=_POURS)
     except ValueError as error:
         say(f"columns, corrected of {test.code}: no prediction: {error}")
