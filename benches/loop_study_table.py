@@ -164,7 +164,9 @@ def _strengths(rows: list[Row]) -> None:
     signs = [np.sign(r["strengths"][0]) for r in rows]
     shift = [s * (r["strength"][0] - r["strengths"][0]) for s, r in zip(signs, rows, strict=True)]
     if shift:
-        print(f"| strength: mean error, rms | {np.mean(shift):.3f}, {np.std(shift):.3f} | | |")
+        size = np.sqrt(np.mean(np.square(shift)))
+        name = "strength: mean error towards its sign, rms"
+        print(f"| {name} | {np.mean(shift):.3f}, {size:.3f} | | |")
 
 
 def _stretch(rows: list[Row]) -> float:

@@ -35,6 +35,32 @@ def test_rates_of_benches_have_their_exact_and_wilson_intervals(
     ]
 
 
+def test_the_error_of_strengths_is_told_with_its_bias(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("torch")
+    monkeypatch.syspath_prepend(ROOT / "benches")
+    table = import_module("loop_study_table")
+    # Half of the truth each, 0.3 too weak whatever the sign: nothing scatters.
+    rows = [
+        {
+            "index": i,
+            "effects": ["drag"],
+            "named": [],
+            "p": 0.5,
+            "kappa": None,
+            "strengths": [0.6 * sign],
+            "strength": [0.3 * sign, -1.0, 1.0],
+            "curve": [[-1.0, 0.0, 1.0], [0.0, 0.0, 0.0]],
+        }
+        for i, sign in enumerate((1, -1, 1, -1))
+    ]
+    table._strengths(rows)
+    assert "| strength: mean error towards its sign, rms | -0.300, 0.300 | | |" in (
+        capsys.readouterr().out.splitlines()
+    )
+
+
 def test_what_benches_import_is_there():
     pytest.importorskip("torch")
     files = [file for folder in FOLDERS for file in sorted((ROOT / folder).rglob("*.py"))]
