@@ -4,9 +4,10 @@
 |---|---|---|
 | base | its own pours leave something: p <= `detect`, for a name p <= `name` | RESIDUAL, NONE |
 | surrogate | it is right at the fit, p > `confirm`, after `settle.py` at the latest | UNCONFIRMED |
-| own pours | they leave nothing: p > `adequate`, for NONE > `name` | RESIDUAL; NONE: UNCONFIRMED |
+| own pours | they leave nothing: p > `adequate`, for NONE > `name` | RESIDUAL, UNCONFIRMED |
 | prior | no random draw of the model is nearer to the data than its fit | UNCONFIRMED |
-| error | with a name D² is not above `LEFT` for each statistic, at 97.5 % | UNEXPLAINED |
+| error | with a name the base model is not nearer to the data, by the 95 % | UNCONFIRMED |
+| distance | with a name D² is not above `LEFT` for each statistic, at 97.5 % | UNEXPLAINED |
 | definitions | the same verdict with every threshold and definition moved | OVERTURNED |
 | sealed rows | the named effect beats what needs no physics (`trivial.py`) | said beside the name |
 
