@@ -145,3 +145,14 @@ def test_young_is_refused_where_grains_are_rigid(
     words = ["export", "material", "drop", "--to", "mujoco", "-o", str(tmp_path / "a.xml")]
     assert main([*words, "--young", "1e7"]) == 2
     assert "young must be left out for mujoco" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("word", ["material", "posterior", "scene", "bed", "frames"])
+def test_help_names_no_option_that_its_word_lacks(
+    word: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    assert main(["export", word, "--help"]) == 0
+    usage, _, told = capsys.readouterr().out.partition("positional arguments:")
+    for option in ("--posterior", "--positions", "--seed"):
+        assert (option in told) == (option in usage), option

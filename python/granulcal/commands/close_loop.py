@@ -46,13 +46,14 @@ and in conditions that share what each has of its own session = "monday"
 (docs/theory/loop.md, "Own errors").
 
 Written to the folder -o: preregistration.json (before any data is seen),
-verdict.json, report.html, and the tables conditions, candidates and
-residuals.parquet. The archive of pours may serve tasks of one scene, prior and
-seed whose lists of effects begin alike; all of it is resumed after an
-interruption. Verdicts: NONE, RESIDUAL (not sure enough for a name), EFFECT, SET
-(not distinguished), EFFECTS (two), UNEXPLAINED; and, with exit code 3,
-UNCONFIRMED (the surrogate is wrong at the fit) and OVERTURNED (by another
-definition of what is examined, [[definitions]] of the task).
+verdict.json, models.json (what `predict` reads), report.html, and the tables
+conditions, candidates and residuals.parquet. The archive of pours may serve
+tasks of one scene, prior and seed whose lists of effects begin alike; all of it
+is resumed after an interruption. Verdicts: NONE, RESIDUAL (not sure enough for
+a name), EFFECT, SET (not distinguished), EFFECTS (two), UNEXPLAINED; and, with
+exit code 3, UNCONFIRMED (a check of the loop's own took the word away; `reason`
+of verdict.json says which) and OVERTURNED (by another definition of what is
+examined, [[definitions]] of the task).
 """
 # The exit code of what is done and does not stand.
 _FALLEN = 3

@@ -63,7 +63,7 @@ def add(commands: Any) -> None:
     _add_frames(words)
 
 
-def _add_common(parser: argparse.ArgumentParser, out: str) -> None:
+def _add_common(parser: argparse.ArgumentParser, out: str, but: str = "") -> None:
     parser.add_argument("-o", "--out", type=writes("export"), required=True, help=out)
     parser.add_argument(
         "--set",
@@ -71,7 +71,7 @@ def _add_common(parser: argparse.ArgumentParser, out: str) -> None:
         default=[],
         type=setting,
         metavar="PATH=NUMBER",
-        help="another number of the scene, as material.restitution=0.5, and none that --posterior has; may be repeated",
+        help=f"another number of the scene, as material.restitution=0.5{but}; may be repeated",
     )
     parser.add_argument("--json", action="store_true", help="print JSON instead of a list")
 
@@ -107,7 +107,7 @@ def _add_posterior(words: Any) -> None:
     parser.add_argument("scene", type=READS, help="TOML, or the word funnel or drop")
     parser.add_argument("--draws", type=int, default=0, help="files of draws (default: none)")
     _add_engine(parser)
-    _add_common(parser, "the folder")
+    _add_common(parser, "the folder", ", and none that the posterior has")
     parser.set_defaults(run=_posterior)
 
 
@@ -120,7 +120,7 @@ def _add_scene(words: Any) -> None:
         "--seed", type=seed_number, default=0, help="seed of the start (default: 0)"
     )
     _add_engine(parser)
-    _add_common(parser, "the folder")
+    _add_common(parser, "the folder", ", and none that --posterior has")
     parser.set_defaults(run=_scene)
 
 
