@@ -21,6 +21,8 @@ from granulcal.experiments.paper.common.eye import BARE, Disturbance, Eye
 from granulcal.experiments.paper.common.measure import (
     Published,
     bootstrap,
+    bootstrap_grid,
+    bootstrap_pairs,
     error_row,
     level_row,
     share_interval,
@@ -289,6 +291,29 @@ def test_a_bootstrap_interval_is_that_of_the_mean():
     assert np.isnan(bootstrap([1.0])).all()
     # Wilson's interval of 8 of 10.
     assert share_interval(8, 10) == pytest.approx((0.4901, 0.9433), abs=1e-3)
+
+
+def test_intervals_of_what_shares_pours_hold_the_mean():
+    """Of ten with each of five and of pairs of ten: values in a row or a pair are not alone."""
+    random, sets = np.random.default_rng(3), 120
+    held: dict[str, int] = dict.fromkeys(("grid", "rows", "pairs", "alone"), 0)
+    apart = [np.subtract.outer(x, x) for x in random.normal(size=(2000, 10))]
+    true = np.abs(apart).sum() / (2000 * 90)
+    for x in random.normal(size=(sets, 10)):
+        own, others = random.normal(size=(10, 1)), random.normal(size=(1, 5))
+        values = 0.36 * own + 0.4 * others + 0.3 * random.normal(size=(10, 5))
+        distances = np.abs(np.subtract.outer(x, x))
+        found = {
+            "grid": (bootstrap_grid(values), 0.0),
+            "rows": (bootstrap(values.mean(axis=1)), 0.0),
+            "pairs": (bootstrap_pairs(distances), true),
+            "alone": (bootstrap(distances[np.triu_indices(10, 1)]), true),
+        }
+        for name, ((low, high), mean) in found.items():
+            held[name] += low <= mean <= high
+    assert held["grid"] >= 0.85 * sets > 0.78 * sets >= held["rows"]
+    assert held["pairs"] >= 0.85 * sets > 0.78 * sets >= held["alone"]
+    assert np.isnan([*bootstrap_grid(np.ones((1, 5))), *bootstrap_pairs(np.zeros((2, 2)))]).all()
 
 
 def test_peaks_of_a_posterior_are_counted():

@@ -22,7 +22,12 @@ from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import formations
 from granulcal.experiments.paper.common.experiment import Experiment
 from granulcal.experiments.paper.common.eye import Disturbance, Eye
-from granulcal.experiments.paper.common.measure import Published, level_row
+from granulcal.experiments.paper.common.measure import (
+    Published,
+    bootstrap_grid,
+    bootstrap_pairs,
+    level_row,
+)
 from granulcal.experiments.paper.common.outcome import Figure, Outcome, Row, Table
 from granulcal.experiments.paper.common.poured_set import PouredSet
 from granulcal.experiments.paper.common.sizes import Size
@@ -142,7 +147,7 @@ class _Grain:
     Attributes:
         estimates: parameters, own units.
         distances: L2 by height, of every recording with every forward pour.
-        floor: L2 between recordings of one height, at 12 cm.
+        floor: L2 between recordings of one height, at 12 cm, shape (m, m).
         outside: whether the model can explain the recordings, in words.
     """
 
@@ -190,8 +195,10 @@ def run(workshop: Workshop) -> Outcome:
         for recipe in _RECIPES:
             label = f"L2 at 12 cm, {name}, {recipe}"
             at = each.distances[recipe][_CALIBRATED_AT]
-            rows.append(level_row(label, at.mean(axis=1), size, paper))
-        rows.append(level_row(f"L2 between recordings at 12 cm, {name}", each.floor, size))
+            # Every recording is held against the same pours.
+            both = bootstrap_grid(at)
+            rows.append(level_row(label, at.mean(axis=1), size, paper, interval=both))
+        rows.append(_between(f"L2 between recordings at 12 cm, {name}", each.floor, size))
         tables.append(_table(name, each))
         file = _picture(workshop, recordings, scene, each.estimates[_RECIPES[1]])
         figures.append(
@@ -260,13 +267,18 @@ def _calibrate(
                 apart = (measured[height][:, None] - poured[None]) / sd
                 at[height] = np.linalg.norm(apart, axis=2)
         distances[recipe] = at
-    pairs = [
-        np.linalg.norm((x[i] - x[j]) / sd) for i in range(len(x)) for j in range(i + 1, len(x))
-    ]
+    floor = np.linalg.norm((x[:, None] - x[None]) / sd, axis=2)
     misfit = model.misfit(x)
     words = "can" if misfit.is_inside else "cannot"
     outside = f"the model {words} explain the recordings at 12 cm (p = {misfit.p_value:.2g})."
-    return _Grain(chosen, distances, np.array(pairs, dtype=np.float64), outside)
+    return _Grain(chosen, distances, floor, outside)
+
+
+def _between(label: str, floor: Array, size: Size) -> Row:
+    """The row of distances (m, m) between m recordings, of which each stands in m - 1 pairs."""
+    pairs = floor[np.triu_indices(len(floor), 1)]
+    interval = bootstrap_pairs(floor)
+    return level_row(label, pairs, size, interval=interval, count=len(floor))
 
 
 def _table(name: str, found: _Grain) -> Table:

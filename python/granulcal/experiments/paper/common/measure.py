@@ -8,7 +8,15 @@ from numpy.typing import ArrayLike, NDArray
 from granulcal.experiments.paper.common.outcome import Row
 from granulcal.experiments.paper.common.sizes import Size
 
-__all__ = ["Published", "bootstrap", "error_row", "level_row", "share_interval"]
+__all__ = [
+    "Published",
+    "bootstrap",
+    "bootstrap_grid",
+    "bootstrap_pairs",
+    "error_row",
+    "level_row",
+    "share_interval",
+]
 
 Array = NDArray[np.float64]
 
@@ -59,6 +67,42 @@ def bootstrap(values: ArrayLike, of: str = "mean") -> tuple[float, float]:
     return float(low), float(high)
 
 
+def bootstrap_grid(values: ArrayLike) -> tuple[float, float]:
+    """Returns the 95 % interval of the mean of `values` (n, m), of n tests with each of m others.
+
+    Both are resampled, each by itself (Owen 2007, doi:10.1214/07-AOAS122): what is resampled along
+    one side alone takes the others for known. NaN for fewer than two of either.
+    """
+    sample = np.asarray(values, float)
+    if min(sample.shape) < 2:
+        return float("nan"), float("nan")
+    random = np.random.default_rng(0)
+    rows, columns = (random.integers(n, size=(_RESAMPLES, n)) for n in sample.shape)
+    each = sample[rows[:, :, None], columns[:, None]].mean(axis=(1, 2))
+    low, high = np.quantile(each, _TAILS)
+    return float(low), float(high)
+
+
+def bootstrap_pairs(distances: ArrayLike) -> tuple[float, float]:
+    """Returns the 95 % interval of the mean over pairs of n, whose `distances` are (n, n).
+
+    The n are resampled, since n - 1 pairs share each of them; a pair of one with itself is none.
+    NaN for fewer than three.
+    """
+    sample = np.asarray(distances, float)
+    if len(sample) < 3:
+        return float("nan"), float("nan")
+    drawn = np.random.default_rng(0).integers(len(sample), size=(_RESAMPLES, len(sample)))
+    apart = drawn[:, :, None] != drawn[:, None]
+    # All one and the same: no pair is left.
+    apart = apart[apart.any(axis=(1, 2))]
+    drawn = drawn[(drawn != drawn[:, :1]).any(axis=1)]
+    each = sample[drawn[:, :, None], drawn[:, None]]
+    means = np.where(apart, each, 0.0).sum(axis=(1, 2)) / apart.sum(axis=(1, 2))
+    low, high = np.quantile(means, _TAILS)
+    return float(low), float(high)
+
+
 def share_interval(hits: int, count: int) -> tuple[float, float]:
     """Returns Wilson's 95 % interval of a share."""
     z, share = 1.96, hits / count
@@ -93,7 +137,14 @@ def error_row(
 
 
 def level_row(
-    quantity: str, values: ArrayLike, size: Size, paper: Published | None = None, digits: int = 4
+    quantity: str,
+    values: ArrayLike,
+    size: Size,
+    paper: Published | None = None,
+    digits: int = 4,
+    *,
+    interval: tuple[float, float] | None = None,
+    count: int | None = None,
 ) -> Row:
     """Returns the row of a distance, of which less is better; what is judged is its mean.
 
@@ -103,16 +154,19 @@ def level_row(
         size: of the run; only a full one is judged.
         paper: the paper's number.
         digits: after the point.
+        interval: 95 % of the mean, where the values do not stand for themselves.
+        count: tests behind it, where they are not the values.
     """
     v = np.asarray(values, float)
-    low, high = bootstrap(v)
+    low, high = bootstrap(v) if interval is None else interval
+    tests = len(v) if count is None else count
     return Row(
         quantity=quantity,
         paper="" if paper is None else str(paper),
         ours=f"{v.mean():.{digits}f} ± {_sd(v):.{digits}f}",
         interval=f"mean {low:.{digits}f} to {high:.{digits}f}",
-        count=len(v),
-        verdict="" if paper is None else _verdict(low, high, paper.mean, len(v), paper, size),
+        count=tests,
+        verdict="" if paper is None else _verdict(low, high, paper.mean, tests, paper, size),
     )
 
 
