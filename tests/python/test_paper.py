@@ -361,8 +361,10 @@ def test_a_change_that_no_curve_shows_is_told_as_far_as_both_sides_were_poured(m
 
     values, x = np.linspace(0.0, 1.0, 5), np.ones((5, 3, len(NAMES)))
     monkeypatch.setattr(propagation, "_RESAMPLES", 20)
+    x[0, 0] = np.nan
     row = propagation._row("q", "p", values, x, 0.75, [("max_z", lambda middle: np.array(0.1))])
-    assert row.ours == "more than ± 0.25"
+    # The pour that cannot be used is none of them.
+    assert (row.ours, row.count) == ("more than ± 0.25", 14)
 
 
 def test_a_change_that_no_curve_shows_is_beyond_the_range_without_a_warning(monkeypatch):

@@ -182,6 +182,8 @@ def _outcome(
         notes=[
             'Models of this comparison are the emulator\'s alone (`method="emulated"`), so that '
             "hundreds of them are affordable; the pours are those of experiment 5.",
+            "The tests that a subset is chosen by, as the greedy choice and the worst of a group, "
+            "are those that its loss is told of: on others the chosen lose more, the worst less.",
             "The paper reports a preliminary study in a sentence and no numbers: subsets suffice "
             "unless they have fewer than three statistics or are of r or z alone.",
         ],

@@ -123,7 +123,8 @@ def _row(quantity: str, paper: str, values: Array, x: Array, at: float, wanted) 
     told = f"more than ± {reach:.2g}" if not np.isfinite(best) else f"± {best:.2g}"
     top = f"{high:.2g}" if np.isfinite(high) else "beyond the range"
     interval = f"{low:.2g} to {top}" if np.isfinite(low) else "beyond the range"
-    return Row(quantity=quantity, paper=paper, ours=told, interval=interval, count=x[:, :, 0].size)
+    count = int(np.isfinite(x).all(axis=2).sum())
+    return Row(quantity=quantity, paper=paper, ours=told, interval=interval, count=count)
 
 
 def _least(values: Array, x: Array, at: float, wanted: list) -> float:
