@@ -21,7 +21,8 @@ __all__ = [
     "close_fronts",
 ]
 
-# Tension in N/m: as multiples of a bead's weight it would grow with gravity.
+# Tension in N/m: as multiples of a bead's weight it would grow with gravity. Where all gravities
+# are one, in units of free fall, it does all the same.
 TENSIONS = (
     LibraryEffect(
         name="tension.capillary",

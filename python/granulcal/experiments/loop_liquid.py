@@ -4,7 +4,9 @@ The base model holds each test's liquid, which flows by itself (`effects.liquid`
 beads, slips through them as Di Felice's drag has it, and runs out ahead of them. All tests are in
 units of their free fall: a column at N g is one at 1 g whose time is $\sqrt N$ times as long, whose
 viscosities are over $\sqrt N$ and whose tension is over N. So one archive and one set of numbers
-are of bench and centrifuge.
+are of bench and centrifuge, but for candidates that have a unit: those are in units of free fall as
+well. Restitution that falls with speed is the bead's own at 1 m/s on the bench and at $\sqrt N$ m/s
+at N g, and a candidate's tension T stands for N T there.
 
 The first frame of a film is where the liquid has come out from under the tube, at 62 mm. So the
 clock of a pour begins when its liquid is there, and no test has a clock of its own but for what is
