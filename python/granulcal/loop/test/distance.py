@@ -3,8 +3,9 @@ r"""How far simulated pours are from measured ones: the paper's error, and one w
 With statistics over the archive's spread, $y$ measured and $x$ simulated,
 
 $$ E = \overline{\lVert y_j - x_i \rVert}, \qquad
-   D^2 = \lVert \bar y - \bar x \rVert^2 - \sum_i \frac{s_{y,i}^2}{n_y} + \frac{s_{x,i}^2}{n_x},
-   \qquad R = 1 - D^2_\mathrm{after} / D^2_\mathrm{before} $$
+   D^2 = \lVert \bar y - \bar x \rVert^2
+   - \sum_i \Big( \frac{s_{y,i}^2}{n_y} + \frac{s_{x,i}^2}{n_x} \Big), \qquad
+   R = 1 - D^2_\mathrm{after} / D^2_\mathrm{before} $$
 
 E, the mean over all pairs, holds the noise of two pours; $D^2$ is unbiased for the squared distance
 of the means and may be negative; R is the share of it that an effect removed. Intervals: pours are
