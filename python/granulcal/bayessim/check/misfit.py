@@ -12,7 +12,7 @@ seen by either.
 For one pour the same is done with the held-out pairs of each fold, which no emulator has seen:
 p-values are ranks among them, so that the false alarm rate is what it says (conformal). For k pours
 the replicates are means of k such residuals around the fit, scaled to the noise there; of their
-variance only the share $a / c^2$ (a of `likelihood.py`, c the widening) is the pours' own, and the
+variance only the share $\eta / c^2$ (of `likelihood.py`; c the widening) is the pours' own, and the
 rest an error of the emulator, which they share and which does not average away. Pours of two
 materials may have the mean of a third, so that their scatter about it,
 
