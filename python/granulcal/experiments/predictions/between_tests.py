@@ -13,8 +13,9 @@ is part of the error.
 
 The 90 % interval of a row is $\pm 1.645 f s$; s is the row's own error, f the root of the mean
 square of error / s with which the row told each measured test from those of other days, or, for a
-gravity at which nothing was measured, from those of the other gravities. A measured test never has
-a part in its own prediction, nor has its day. No front is told beyond what the cameras see.
+gravity at which nothing was measured, from those of the other gravities. A measured test is told
+from tests of other days alone; but the covariance of `between`, the scatter in s and f, through how
+the others are told, know all tests. No front is told beyond what the cameras see.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,7 +38,6 @@ _VISCOSITY, _BY_GRAVITY, _CLAY, _DAY, _NOISE = 0.30, 0.45, 0.37, 0.45, 0.50
 # Powers of 1 / N; 0 is the logarithm.
 _POWERS = (0.0, 0.5, 1.0)
 _PLANE_POWER = 0.5
-# Standard deviations from the middle of a 90 % interval to its ends.
 # Least scatter of the tests at one time, and what the cameras see [mm].
 _LEAST, _SEEN = 1.0, 200.0
 
