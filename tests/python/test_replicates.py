@@ -1,8 +1,12 @@
 """Several pours of one material among the training pairs."""
 
 import numpy as np
+import pytest
 
-from granulcal.bayessim.replicates import dealt, gathered, in_turns, material_of, split
+from granulcal.bayessim import BayesSim
+from granulcal.bayessim.check.toys import LinearGaussian
+from granulcal.bayessim.replicates import dealt, firsts, gathered, in_turns, material_of, split
+from granulcal.errors import TrainingDataError
 
 
 def _pours(materials=9, each=4, seed=0):
@@ -52,3 +56,20 @@ def test_pours_of_a_material_each_are_split_as_ever():
 def test_few_materials_are_dealt_by_their_pours():
     material, order = _pours(materials=2)
     assert [len(hand) for hand in dealt(order, material, 4)] == [2, 2, 2, 2]
+
+
+def test_a_material_counts_once_in_a_check():
+    """Checks that count ten pours of a material each fail exact posteriors four times in five."""
+    assert firsts(np.array([2, 0, 2, 1, 0])).tolist() == [0, 1, 3]
+    toy = LinearGaussian.random(seed=3, noise=3.0, bounded=True)
+    theta = np.repeat(toy.prior.sample(30, seed=1), 10, axis=0)
+    x = toy.simulate_at(theta, seed=2)
+    model = BayesSim.fit(theta, x, toy.prior, quiet=True, method="emulated")
+    assert model.calibration is not None and model.calibration.test_count == 30
+    assert model.summary.test_count == 30
+    fresh = np.repeat(toy.prior.sample(20, seed=3), 5, axis=0)
+    seen = toy.simulate_at(fresh, seed=4)
+    all_of_them, first = model.check(fresh, seen), model.check(fresh[::5], seen[::5])
+    assert all_of_them.as_dict() == first.as_dict()
+    with pytest.raises(TrainingDataError, match="10 usable pairs of different parameters .* got 9"):
+        model.check(fresh[:45], seen[:45])

@@ -28,6 +28,7 @@ from granulcal.bayessim.network.trainer import Progress
 from granulcal.bayessim.posterior.average import Average
 from granulcal.bayessim.posterior.doubts import out_of_range
 from granulcal.bayessim.posterior.posterior import Posterior
+from granulcal.bayessim.replicates import firsts, material_of
 from granulcal.bayessim.storage.model_folder import load_parts, save_model
 from granulcal.bayessim.training.config import Config
 from granulcal.bayessim.training.fit import told_not_of_prior, train_model
@@ -311,15 +312,22 @@ class BayesSim:
     ) -> tuple[Calibration, Identifiability]:
         """Returns the calibration on pairs and what their statistics tell on average.
 
-        Both are of the same posteriors, one for each pair. Arguments and errors are those of
-        `check`.
+        Both are of the same posteriors, one for each pair; of several pairs of the same parameters
+        the first counts. Arguments and errors are those of `check`.
         """
         check_whole("draw_count", draw_count, at_least=1)
         x = by_name("x", x, self.x_names, whose="the model", error=TrainingDataError)
         pairs = TrainingPairs.gather(
             theta, x, prior=self.prior, x_names=self.x_names, fewest=FEWEST_TO_CHECK
         )
-        truth, observed = pairs.theta, pairs.x
+        # Several pours of one material are one truth: counted each they fail right posteriors.
+        alone = firsts(material_of(pairs.theta))
+        if len(alone) < FEWEST_TO_CHECK:
+            raise TrainingDataError(
+                f"at least {FEWEST_TO_CHECK} usable pairs of different parameters are needed, got "
+                f"{len(alone)}"
+            )
+        truth, observed = pairs.theta[alone], pairs.x[alone]
         posteriors = [self.posterior(row) for row in steps("posteriors", list(observed))]
         known = Identifiability.average(posteriors, truth)
         return Calibration.of(self.prior, posteriors, truth, draw_count=draw_count), known

@@ -2,12 +2,14 @@
 
 Pours of one material differ by chance alone. A network that has seen some of them knows the
 parameters of the others, and a check on those would find it right however wrong it is elsewhere.
+Nor are they as many truths: ranks and regions of one truth hang together, and a check that counts
+each finds right posteriors wrong.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["dealt", "gathered", "in_turns", "material_of", "split"]
+__all__ = ["dealt", "firsts", "gathered", "in_turns", "material_of", "split"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -20,6 +22,11 @@ def material_of(theta: Array) -> Rows:
     number = np.empty(len(theta), dtype=np.intp)
     number[order] = np.concatenate([[0], np.cumsum(is_new)])[: len(theta)]
     return number
+
+
+def firsts(material: Rows) -> Rows:
+    """Returns the rows that are the first of their material, in their order."""
+    return np.sort(np.unique(material, return_index=True)[1])
 
 
 def gathered(order: Rows, material: Rows) -> Rows:

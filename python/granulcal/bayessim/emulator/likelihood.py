@@ -45,7 +45,7 @@ from granulcal.bayessim.emulator.linear import linear_scores
 from granulcal.bayessim.emulator.noise import Noise
 from granulcal.bayessim.emulator.signal import SignalAxes
 from granulcal.bayessim.posterior.coordinates import coordinates_of, quasi_prior
-from granulcal.bayessim.replicates import dealt, material_of
+from granulcal.bayessim.replicates import dealt, firsts, material_of
 from granulcal.prior import Prior
 from granulcal.progress import steps
 
@@ -196,7 +196,10 @@ class Likelihood:
                     levels[key] = np.column_stack([levels[key], level]) if key in levels else level
                     fits.setdefault(key, []).append(found)
         held_out = np.concatenate([part[: _HELD_OUT // _FOLDS] for part in parts])
-        best, chosen = _most_probable_of_the_honest(scores, levels)
+        # Levels of one material's pours hang together: one of each says whether they are uniform.
+        alone = firsts(material_of(u[held_out]))
+        honest = {key: each[:, alone] for key, each in levels.items()}
+        best, chosen = _most_probable_of_the_honest(scores, honest)
         widening = WIDENINGS[chosen]
         linear = [
             linear_scores(u, z, np.setdiff1d(everything, part), part[: _HELD_OUT // _FOLDS])

@@ -15,7 +15,7 @@ from granulcal.bayessim.network.standardise import Standardiser
 from granulcal.bayessim.network.trainer import Progress, TrainingResult
 from granulcal.bayessim.posterior.average import EMULATOR_ALONE, NETWORK_ALONE, Average, HeldOut
 from granulcal.bayessim.posterior.posterior import Posterior
-from granulcal.bayessim.replicates import in_turns, material_of, split
+from granulcal.bayessim.replicates import firsts, in_turns, material_of, split
 from granulcal.bayessim.training.config import Config
 from granulcal.bayessim.training.pairs import TrainingPairs
 from granulcal.bayessim.training.summary import TrainingSummary
@@ -108,9 +108,9 @@ class _Work:
         self.z = self.standardiser.apply(pairs.x)
         self.weights = importance_weights(pairs, proposal)
         order = np.random.default_rng(seed).permutation(len(self.u))
-        material = material_of(self.u)
-        sides = split(order, material, _test_count(len(order), config.test_share))
-        self.test, self.rest = (in_turns(rows, material) for rows in sides)
+        self.material = material_of(self.u)
+        sides = split(order, self.material, _test_count(len(order), config.test_share))
+        self.test, self.rest = (in_turns(rows, self.material) for rows in sides)
 
     def emulated(self) -> Trained:
         """The emulator's posterior; every pair is used, and checked by a fit without it."""
@@ -165,7 +165,7 @@ class _Work:
         ]
         told += f", {average} {held_out.gain(average):.2f}"
         choice_text = f"average of an emulator and a network\n  emulator: {choice}\n  {told}"
-        summary = self._summary("averaged", choice_text, result, len(self.rest), len(rows))
+        summary = self._summary("averaged", choice_text, result, len(self.rest), len(chosen))
         return Trained(
             self.standardiser,
             likelihood,
@@ -255,13 +255,14 @@ class _Work:
         )
 
     def _of_the_prior(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Indices of `rows` as if they were drawn from the prior."""
-        if self.weights is None or len(rows) == 0:
-            return np.arange(len(rows))
+        """Indices of `rows` as if they were drawn from the prior, one of each material."""
         # Each once at most: a truth that is drawn twice is one truth, and no evidence of two.
+        alone = firsts(self.material[rows])
+        if self.weights is None or len(rows) == 0:
+            return alone
         share = self.weights[rows] / self.weights[rows].max()
         kept = np.random.default_rng(self.seed).random(len(rows)) < share
-        return np.flatnonzero(kept)
+        return alone[kept[alone]]
 
     def _notes(self) -> tuple[str, ...]:
         """What is odd about the statistics."""
