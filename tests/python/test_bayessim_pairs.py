@@ -154,6 +154,25 @@ def test_a_proposal_whose_pairs_are_worth_little_of_the_prior_is_told(capsys):
     assert f"note: {note}" in capsys.readouterr().out
 
 
+def test_a_proposal_that_leaves_a_part_of_the_prior_out_is_refused():
+    """Its weights are all the same: the narrower posterior passed for the prior's and its check."""
+    first = BOUNDED.prior.free[0]
+    low, high = first.bounds
+    for share, is_refused in ((0.6, True), (0.995, False)):
+        cut = Parameter(
+            path=first.path, distribution="uniform", low=low, high=low + share * (high - low)
+        )
+        proposal = Prior([cut, *BOUNDED.prior.parameters[1:]])
+        theta = proposal.sample(80, seed=5)
+        x = BOUNDED.simulate_at(theta, seed=2)
+        if is_refused:
+            message = f"proposal has {first.path} from -1 to 1.4 only, and 40% of the prior"
+            with pytest.raises(TrainingDataError, match=message):
+                BayesSim.fit(theta, x, BOUNDED.prior, proposal=proposal, **QUICK)
+        else:
+            BayesSim.fit(theta, x, BOUNDED.prior, proposal=proposal, **QUICK)
+
+
 def test_pours_that_cannot_be_used_were_drawn_from_the_prior(toy):
     """Rows that are left out because of what they are make no other prior of the rest."""
     for drawn in (toy, BOUNDED):

@@ -150,7 +150,8 @@ class BayesSim:
             x_names: names of the statistics; those of the columns if `x` is a data frame.
             scene: scene of the pours, saved with the model: TOML text, or has `to_toml()`.
             proposal: what the parameters were drawn from, if it was not the prior; the pairs are
-                weighted then, and those outside of the prior are left out.
+                weighted then, and those outside of the prior are left out. It reaches wherever the
+                prior does.
             quiet: print nothing.
             progress: called after each pass over the pairs.
             **config: settings of `Config`, for example `method="plain"` or `components=10`.

@@ -31,6 +31,8 @@ _WORTHWHILE_TEST_PAIRS = 50
 _PAIRS_FOR_A_WORTHWHILE_TEST = 300
 # Fewer equal draws of the prior than a proposal's weighted pairs are worth have been overconfident.
 _FEWEST_OF_PRIOR = 150
+# Of a parameter's prior so much may lie where the proposal has no pairs.
+_LARGEST_UNCOVERED = 0.01
 # One of n values is at most sqrt(n) standard deviations out; there it has 4/5 of the variance.
 _FAR = 0.9
 
@@ -339,7 +341,8 @@ def importance_weights(pairs: TrainingPairs, proposal: Prior | None) -> Array | 
     """Returns p(theta) / proposal(theta) of each pair over their mean, shape (n,).
 
     Raises:
-        TrainingDataError: the proposal has other parameters, or cannot have made the pairs.
+        TrainingDataError: the proposal has other parameters, cannot have made the pairs, or has
+            none where more than a hundredth of the prior is.
     """
     if proposal is None:
         return None
@@ -347,12 +350,25 @@ def importance_weights(pairs: TrainingPairs, proposal: Prior | None) -> Array | 
         raise TrainingDataError(
             f"proposal must have the prior's parameters {pairs.prior.names}, got {proposal.names}"
         )
+    _require_covered(pairs.prior, proposal)
     log_weights = pairs.prior.log_prob(pairs.theta) - proposal.log_prob(pairs.theta)
     if not np.all(np.isfinite(log_weights)):
         count = int(np.sum(~np.isfinite(log_weights)))
         raise TrainingDataError(f"{count} rows of theta are outside the proposal's bounds")
     weights = np.exp(log_weights - log_weights.max())
     return weights / weights.mean()
+
+
+def _require_covered(prior: Prior, proposal: Prior) -> None:
+    """Refuses a proposal without pairs in a part of the prior: no weight stands for what is not."""
+    low, high = prior.cdf(proposal.bounds.T)
+    for name, left, bounds in zip(prior.names, low + 1 - high, proposal.bounds, strict=True):
+        if left > _LARGEST_UNCOVERED:
+            raise TrainingDataError(
+                f"proposal has {name} from {bounds[0]:g} to {bounds[1]:g} only, and {left:.0%} of "
+                "the prior lies beyond: nothing is learnt there; a prior within the proposal, or "
+                "pours of the rest, are needed"
+            )
 
 
 def _test_count(pair_count: int, share: float) -> int:
