@@ -154,6 +154,21 @@ def test_a_proposal_whose_pairs_are_worth_little_of_the_prior_is_told(capsys):
     assert f"note: {note}" in capsys.readouterr().out
 
 
+def test_few_pairs_of_the_prior_do_not_choose_a_network():
+    """By pairs of the proposal alone the network was chosen, whose 90 % regions held 69 %."""
+    path, low, high = "a.b", 0.0, 1.0
+    even = Parameter(path=path, distribution="uniform", low=low, high=high)
+    near = Parameter(path=path, distribution="normal", mean=0.5, sd=0.15, low=low, high=high)
+    prior, proposal = Prior([even]), Prior([near])
+    generator = np.random.default_rng(1)
+    theta = proposal.sample(500, seed=1)
+    x = theta + 0.3 * generator.standard_normal(theta.shape)
+    quick = {**QUICK, "method": "auto", "max_epochs": 60, "patience": 10}
+    model = BayesSim.fit(theta, x, prior, seed=1, proposal=proposal, **quick)
+    assert model.summary.method == "emulated"
+    assert any("worth" in note for note in model.summary.notes)
+
+
 def test_a_proposal_that_leaves_a_part_of_the_prior_out_is_refused():
     """Its weights are all the same: the narrower posterior passed for the prior's and its check."""
     first = BOUNDED.prior.free[0]

@@ -137,7 +137,8 @@ class _Work:
         """Emulator and network, averaged with the weights that say most about held-out pairs."""
         order = np.concatenate([self.test, self.rest])
         likelihood, folds, choice = self._likelihood(np.arange(len(self.u)), order)
-        if len(self.test) == 0:
+        # A network of few pairs of the prior is too narrow, and as few cannot tell.
+        if len(self.test) == 0 or self._few_of_the_prior is not None:
             return self._by_emulator(likelihood, folds, choice)
         amortised, result = self._network()
         # The same pairs for both: those kept aside from the network are held out by the folds too.
@@ -289,15 +290,21 @@ class _Work:
             )
         if self.weights is None and self.pairs.not_of_prior:
             notes.append(told_not_of_prior(self.pairs))
-        if self.weights is not None:
-            worth = float(np.sum(self.weights) ** 2 / np.sum(self.weights**2))
-            if worth < min(_FEWEST_OF_PRIOR, 0.5 * len(self.weights)):
-                notes.append(
-                    f"the {len(self.weights)} pairs of the proposal are worth {worth:.0f} of the "
-                    f"prior, at least {_FEWEST_OF_PRIOR} are wanted: posteriors may be too narrow; "
-                    "a prior or a proposal nearer to each other helps"
-                )
+        if (worth := self._few_of_the_prior) is not None:
+            notes.append(
+                f"the {len(self.z)} pairs of the proposal are worth {worth:.0f} of the prior, at "
+                f"least {_FEWEST_OF_PRIOR} are wanted: posteriors may be too narrow; a prior or a "
+                "proposal nearer to each other helps"
+            )
         return tuple(notes)
+
+    @property
+    def _few_of_the_prior(self) -> float | None:
+        """How many pairs of the prior those of a proposal are worth, if too few."""
+        if self.weights is None:
+            return None
+        worth = float(np.sum(self.weights) ** 2 / np.sum(self.weights**2))
+        return worth if worth < min(_FEWEST_OF_PRIOR, 0.5 * len(self.weights)) else None
 
     def _summary(
         self, method: str, choice: str, result: TrainingResult | None, train: int, test: int
