@@ -264,6 +264,22 @@ def test_the_noise_of_several_pours_is_as_large_as_it_is_at_their_fit():
     assert alarms <= 6, alarms
 
 
+def test_statistics_that_are_the_same_raise_no_alarm():
+    """As series after their end. Their difference is round-off, whose pours were compared, too."""
+    prior = Prior([Parameter(path="a.b", distribution="uniform", low=0.0, high=1.0)])
+    generator = np.random.default_rng(1)
+
+    def pours(theta):
+        one = theta + 0.1 * generator.standard_normal(theta.shape)
+        return one * np.array([1.0, 2.0, -1.0])
+
+    theta = prior.sample(400, seed=0)
+    model = BayesSim.fit(theta, pours(theta), prior, quiet=True, method="emulated")
+    truths = prior.sample(100, seed=5)
+    alarms = sum(not model.misfit(pours(np.tile(one, (5, 1)))).is_inside for one in truths)
+    assert alarms <= binomial_band(100, 0.05, probability=0.99)[1]
+
+
 def test_pairs_that_are_there_twice_are_left_out():
     prior = Prior([Parameter(path="t", distribution="uniform", low=0.0, high=1.0)])
     theta = prior.sample(60, seed=3)

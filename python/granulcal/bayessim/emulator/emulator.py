@@ -32,6 +32,8 @@ _SCALE_FEATURES = 16
 _SCALE_STRETCH = 2.0
 # Points at which the uncertainty of the means is tabulated before it is fitted.
 _UNCERTAINTY_POINTS = 1500
+# An axis of statistics that hang together exactly has no more spread than this, which is round-off.
+_ROUND_OFF = 1e-9
 # Points whose features are held at once: so many stay in the processor's cache.
 _BLOCK = 512
 
@@ -105,7 +107,7 @@ class Emulator:
             scale of the noise, shape (n, s).
         """
         shift, spread = y.mean(axis=0), y.std(axis=0)
-        spread = np.where(spread > 0, spread, 1.0)
+        spread = np.where(spread > _ROUND_OFF, spread, 1.0)
         z = (y - shift) / spread
         count, statistics = z.shape
         basis = Basis.draw(u, length_scales, features=features, seed=seed)
