@@ -1,6 +1,7 @@
 """The loop's statistics against a linear-Gaussian simulator, where everything is known."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ from granulcal.loop import (
     power,
     trace,
 )
+from granulcal.loop.check.trivial import Group, trivial_rows
 from granulcal.loop.effects.design import cube_from_normal, normal_from_cube
 from granulcal.loop.surrogate.baseline import fit_base
 from granulcal.loop.surrogate.blocks import fit_blocks
@@ -390,6 +392,51 @@ def test_noise_free_squares_are_unbiased() -> None:
         for _ in range(2000)
     ]
     assert np.mean(found) == pytest.approx(1.25, abs=0.1)
+
+
+def noise_along(shift: float, rows: Sequence[Array]) -> float:
+    """Variance of the sum of the means of pours (n, s), along a gap of `shift` in each number."""
+    along = [each.sum(axis=1) * shift for each in rows]
+    return sum(each.var(ddof=1) / len(each) for each in along)
+
+
+def width(interval: tuple[float, float]) -> float:
+    """From one end to the other."""
+    return interval[1] - interval[0]
+
+
+@pytest.mark.parametrize("measured", [1, 2, 3])
+def test_intervals_of_few_pours_are_as_wide_as_their_noise(measured: int) -> None:
+    # Two pours drawn again from two scatter by 0.71 of what two fresh ones do.
+    generator, shift, places, size = np.random.default_rng(6), 30.0, 8, 4
+    labels = [str(place) for place in range(places)]
+    pours = [shift + generator.standard_normal((measured, size)) for _ in labels]
+    first, second = (
+        [at * shift + generator.standard_normal((10, size)) for _ in labels] for at in (0, 2)
+    )
+    found = compare(labels, pours, first, second, np.ones(size), draws=1200)
+    ours = noise_along(shift, first)
+    theirs = noise_along(shift, pours) if measured > 1 else 10 * ours
+    sd = 2 * np.sqrt(theirs + ours) / places
+    assert width(found.total_before.interval) == pytest.approx(2 * 1.96 * sd, rel=0.07)
+    # A measured pour moves one square up and the other down.
+    sd = 2 * np.sqrt(4 * theirs + ours + noise_along(shift, second)) / places
+    assert width(found.gain_interval) == pytest.approx(2 * 1.96 * sd, rel=0.07)
+
+
+def test_rows_without_physics_have_the_noise_of_few_pours() -> None:
+    generator, shift, size = np.random.default_rng(7), 30.0, 4
+
+    def group(gap: float) -> Group:
+        pours = (gap + generator.standard_normal((2, size)), *generator.normal(size=(2, 10, size)))
+        return Group("", np.zeros(1), *pours)
+
+    fitted, sealed = ([group(gap) for _ in range(8)] for gap in (0.0, shift))
+    nearest = trivial_rows(fitted, sealed, np.ones(size))[0]
+    # What is measured under the sealed ones moves both squares alike.
+    noise = [[g.measured for g in fitted], [g.named for g in sealed]]
+    sd = 2 * np.sqrt(sum(noise_along(shift / 8, rows) for rows in noise))
+    assert width(nearest.gain_interval) == pytest.approx(2 * 1.96 * sd, rel=0.07)
 
 
 def test_removed_share_and_its_interval() -> None:

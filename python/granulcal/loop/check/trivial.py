@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.test.distance import noise_free_square
+from granulcal.loop.test.distance import drawn_again, noise_free_square
 
 __all__ = ["LINE", "NEAREST", "RESIDUAL", "Group", "TrivialRow", "line_weights", "trivial_rows"]
 
@@ -239,14 +239,6 @@ def _noise(rows: Array, simulated: Array) -> Array:
 
 def _again(group: Group, generator: np.random.Generator) -> Group:
     """The same condition with its pours drawn again."""
-
-    def draw(rows: Array) -> Array:
-        return rows[generator.integers(len(rows), size=len(rows))]
-
-    measured = group.measured
-    if len(measured) > 1:
-        measured = draw(measured)
-    else:
-        noise = group.base - group.base.mean(axis=0)
-        measured = measured + noise[generator.integers(len(noise))]
-    return Group(group.label, group.at, measured, draw(group.base), draw(group.named))
+    measured = drawn_again(group.measured, generator, group.base)
+    base, named = drawn_again(group.base, generator), drawn_again(group.named, generator)
+    return Group(group.label, group.at, measured, base, named)

@@ -10,11 +10,14 @@ $$ E = \overline{\lVert y_j - x_i \rVert}, \qquad
 E, the mean over all pairs, holds the noise of two pours; $D^2$ is unbiased for the squared distance
 of the means and may be negative; R is the share of it that an effect removed. Intervals: pours are
 drawn again within each condition, and the draws are moved so that their mean is the estimate (a
-drawn mean has its noise twice). A single measured pour borrows the scatter of the simulated ones.
+drawn mean has its noise twice). The mean of n pours that are drawn again from n scatters by
+$\sqrt{(n - 1) / n}$ of what it should, of two pours by 0.71: they are drawn by so much farther from
+their mean. A single measured pour borrows the scatter of the simulated ones.
 
 Reference:
     Matl et al., Inferring the material properties of granular media for robotic tasks, ICRA 2020
-    (E). Efron and Tibshirani, An introduction to the bootstrap, 1993, sections 8 and 10.
+    (E). Efron and Tibshirani, An introduction to the bootstrap, 1993, sections 8 and 10. Rao and
+    Wu, Resampling inference with complex survey data, JASA 83, 1988 (few draws, rescaled).
 """
 
 from collections.abc import Sequence
@@ -26,7 +29,7 @@ from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
 
-__all__ = ["Distance", "Improvement", "compare", "noise_free_square", "pair_error"]
+__all__ = ["Distance", "Improvement", "compare", "drawn_again", "noise_free_square", "pair_error"]
 
 Array = NDArray[np.float64]
 
@@ -131,6 +134,22 @@ def noise_free_square(measured: Array, simulated: Array, spread: Array) -> float
     return float(gap @ gap - np.sum(theirs / len(y) + own / len(x)))
 
 
+def drawn_again(
+    rows: Array, generator: np.random.Generator, simulated: Array | None = None
+) -> Array:
+    """Returns pours (n, s) drawn again, their mean as scattered as that of n fresh pours.
+
+    Args:
+        rows: the pours; a single one has the scatter of `simulated`.
+        generator: of the draws.
+        simulated: pours of the same condition, shape (k >= 2, s).
+    """
+    source = simulated if len(rows) == 1 and simulated is not None else rows
+    # Of the draws' own mean they lie nearer than of the truth.
+    noise = (source - source.mean(axis=0)) * np.sqrt(len(source) / max(len(source) - 1, 1))
+    return rows.mean(axis=0) + noise[generator.integers(len(source), size=len(rows))]
+
+
 def compare(
     labels: Sequence[str],
     measured: Sequence[Array],
@@ -168,10 +187,9 @@ def compare(
     drawn = np.empty((draws, 2, len(labels)))
     for b in range(draws):
         for h, y in enumerate(measured):
-            again = _redraw_measured(y, before[h], generator)
+            again = drawn_again(y, generator, before[h])
             for i, simulated in enumerate(sets):
-                x = simulated[h]
-                chosen = x[generator.integers(len(x), size=len(x))]
+                chosen = drawn_again(simulated[h], generator)
                 drawn[b, i, h] = noise_free_square(again, chosen, spread)
     drawn += squares - drawn.mean(axis=0)
     totals, total = drawn.mean(axis=2), squares.mean(axis=1)
@@ -212,13 +230,6 @@ def compare(
         if is_something
         else (nothing, nothing),
     )
-
-
-def _redraw_measured(y: Array, simulated: Array, generator: np.random.Generator) -> Array:
-    if len(y) > 1:
-        return y[generator.integers(len(y), size=len(y))]
-    noise = simulated - simulated.mean(axis=0)
-    return y + noise[generator.integers(len(noise))]
 
 
 def _interval(values: Array) -> tuple[float, float]:
