@@ -22,10 +22,9 @@ from granulcal.loop.check.recentre import gap_of
 from granulcal.loop.surrogate.baseline import Fit
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.surrogate import Surrogate
+from granulcal.loop.test.box import log_mass
 
 __all__ = ["ByPours", "log_evidence"]
-
-_BOX_DRAWS = 4000
 
 
 class ByPours(NamedTuple):
@@ -83,9 +82,6 @@ def log_evidence(
     log_z -= 0.5 * float(np.linalg.slogdet(normal)[1])
     if active:
         low = np.array([surrogate.design.effects[k].low for k in active])
-        covariance = np.linalg.inv(normal)[p:, p:]
-        noise = np.random.default_rng(0).standard_normal((_BOX_DRAWS, len(active)))
-        draws = end[p:] + noise @ np.linalg.cholesky(covariance).T
-        inside = int(((draws >= low) & (draws <= 1)).all(axis=1).sum())
-        log_z += float(np.log(max(inside, 1) / _BOX_DRAWS) - np.log(1 - low).sum())
+        covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)[p:, p:]
+        log_z += log_mass(end[p:], covariance, low) - float(np.log(1 - low).sum())
     return log_z

@@ -14,8 +14,9 @@ each node: strengths are bounded and ridges are bent, both of which a single nor
 grid of nodes is split where its log density changes much near its largest, for a camera's blur is
 known to a hundredth of its range and falls by hundreds of nats from one node to the next; between
 nodes the log density is the cubic that keeps to what is between their values. Two strengths take
-Laplace's method jointly, the normal cut to the priors' box. A model's log probability adds the log
-of its prior share.
+Laplace's method jointly, the normal cut to the priors' box (`box.py`); where one is held at an end
+of its prior, the normal has the slope of the density there, and its middle beyond. A model's log
+probability adds the log of its prior share.
 
 Reference:
     Tierney and Kadane, Accurate approximations for posterior moments, JASA 81, 1986.
@@ -35,6 +36,7 @@ from numpy.typing import NDArray
 
 from granulcal.loop.surrogate.baseline import Fit, Start, improve
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
+from granulcal.loop.test.box import log_mass, marginal
 from granulcal.loop.test.thresholds import Thresholds
 
 __all__ = ["Model", "by_probability", "fit_none", "fit_pair", "fit_single", "interval", "root_at"]
@@ -49,7 +51,6 @@ _CHANGE, _NEAR = 1.0, 3.0
 _SPLITS, _CLOSEST = 14, 2e-5
 # Points between two nodes that are closer than those of `_FINE`.
 _BETWEEN = 8
-_BOX_DRAWS = 4000
 
 
 @dataclass(frozen=True)
@@ -182,7 +183,7 @@ def interval(curve: Array, level: float, stretch: float = 1.0) -> tuple[float, f
         level: probability between its ends.
         stretch: tau: the density is taken to the power 1 / tau^2, which stretches a normal by tau.
     """
-    at, weights = curve[0], np.exp(curve[1] / stretch**2)
+    at, weights = curve[0], np.exp((curve[1] - curve[1].max()) / stretch**2)
     steps = np.concatenate([[0.0], np.cumsum((weights[1:] + weights[:-1]) / 2 * np.diff(at))])
     tail = (1 - level) / 2
     low, high = np.interp([tail, 1 - tail], steps / steps[-1], at)
@@ -204,21 +205,21 @@ def fit_pair(
     )
     effects = local.surrogate.design.effects
     low = np.array([effects[k].low for k in pair])
-    white = np.linalg.solve(fit.root, fit.slopes)
-    precision = np.concatenate([np.ones(len(fit.v)), np.full(2, 1e-6)])
+    white = np.linalg.solve(fit.root, np.column_stack([fit.slopes, fit.residual]))
+    white, rest = white[:, :-1], white[:, -1]
+    p, centre = len(fit.v), fit.psi[list(pair)]
+    precision = np.concatenate([np.ones(p), np.full(2, 1e-6)])
     normal = white.T @ white + np.diag(precision)
-    covariance = np.linalg.inv(normal)[len(fit.v) :, len(fit.v) :]
-    centre = fit.psi[list(pair)]
-    draws = centre + np.random.default_rng(0).standard_normal((_BOX_DRAWS, 2)) @ (
-        np.linalg.cholesky(covariance).T
-    )
-    inside = draws[((draws >= low) & (draws <= 1)).all(axis=1)]
-    share = max(len(inside), 1) / _BOX_DRAWS
+    covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
+    # At an end of a prior the density still rises outwards: its largest is no maximum there, and
+    # the normal that has this slope at the end has its middle beyond.
+    is_held = np.concatenate([np.zeros(p, dtype=bool), (centre <= low) | (centre >= 1)])
+    rise = np.where(is_held, white.T @ rest, 0.0)
+    middle = centre + (covariance @ rise)[p:]
     log_evidence = fit.log_density + 0.5 * len(normal) * float(np.log(2 * np.pi))
-    log_evidence += -0.5 * float(np.linalg.slogdet(normal)[1]) + float(np.log(share))
-    log_evidence -= float(np.log(1 - low).sum())
-    tail = (1 - thresholds.level) / 2
-    used = inside if len(inside) > 10 else centre[None]
+    log_evidence += 0.5 * float(rise @ covariance @ rise - np.linalg.slogdet(normal)[1])
+    log_evidence += log_mass(middle, covariance[p:, p:], low) - float(np.log(1 - low).sum())
+    curves = [marginal(middle, covariance[p:, p:], low, i) for i in (0, 1)]
     count = comb(len(local.surrogate.design.candidates), 2)
     left = 1 - thresholds.null_share - thresholds.single_share
     return Model(
@@ -226,8 +227,8 @@ def fit_pair(
         best,
         log_evidence,
         log_evidence + float(np.log(left / count)),
-        used.mean(axis=0),
-        np.quantile(used, [tail, 1 - tail], axis=0).T,
+        np.array([_mean(curve) for curve in curves]),
+        np.array([interval(curve, thresholds.level) for curve in curves]),
         bool((np.where(low < 0, abs(centre), centre) > 0.98).any()),
         np.empty((2, 0)),
     )
@@ -280,6 +281,12 @@ def _cubic(x: Array, y: Array, at: Array) -> Array:
     t = (at - x[i]) / width
     a = (1 + 2 * t) * (1 - t) ** 2 * y[i] + t * (1 - t) ** 2 * width * slopes[i]
     return a + t**2 * (3 - 2 * t) * y[i + 1] + t**2 * (t - 1) * width * slopes[i + 1]
+
+
+def _mean(curve: Array) -> float:
+    """The mean of a strength's posterior, strengths and log density of shape (2, n)."""
+    at, weights = curve[0], np.exp(curve[1] - curve[1].max())
+    return _trapezoid(weights * at, at) / _trapezoid(weights, at)
 
 
 def _trapezoid(y: Array, x: Array) -> float:
