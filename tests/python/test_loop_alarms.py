@@ -75,6 +75,13 @@ def test_an_error_that_is_left_of_an_explanation_is_said() -> None:
     assert of_left(Verdict("UNEXPLAINED", (), (), 1e-3, ""), left, left) == ()
 
 
+def test_what_is_left_where_a_name_was_taken_back_is_of_the_base_model() -> None:
+    # The fits named an effect whose model leaves nothing; NONE is said of the base model.
+    (told,) = of_left(NONE, error(1.0, 0.0), None, is_taken_back=True)
+    assert "D² of the base model is left at there (fitted): 4" in told
+    assert of_left(NONE, error(0.0, 1.0), None, is_taken_back=True) == ()
+
+
 def test_what_was_not_tried_is_said_beside_a_fault_of_the_image() -> None:
     scene = Scene.funnel(height=0.1)
     tried = by_name(["camera.offset", "drag", "height"])

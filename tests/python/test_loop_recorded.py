@@ -328,6 +328,9 @@ def test_a_candidate_that_is_not_named_is_not_the_effect() -> None:
     faint = page(strengths=strengths, held=(54, 63), is_named=False, word="RESIDUAL")
     assert "<h2>The effect</h2>" not in faint and "candidate, not named" in faint
     assert "The verdict is RESIDUAL and names nothing" in faint and "Consistent with" not in faint
+    # Errors after are with the candidate, whatever the word.
+    assert "After is with the most probable candidate" in faint and "After is with" not in named
+    assert "Linear, hence" not in faint
 
 
 def test_both_floors_and_whose_interval_it_is_are_on_the_page() -> None:

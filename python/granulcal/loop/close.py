@@ -214,7 +214,9 @@ def close_loop(
     say(f"placebo {placebo.verdict.kind}: {placebo.verdict.reason}")
     verdict = standing.verdict
     alarms = of_error(verdict, fit, sealed) + of_placebo(placebo.verdict, rules)
-    alarms += of_left(verdict, fit, sealed) + of_rows(standing) + told_unseen(poured)
+    is_taken_back = bool(found.best.effects) and not verdict.named
+    alarms += of_left(verdict, fit, sealed, is_taken_back=is_taken_back)
+    alarms += of_rows(standing) + told_unseen(poured)
     alarms += of_ends(verdict, found.best, task) + of_untried(verdict, task.untried)
     alarms += of_base_fit(verdict, settled.at_base, rules)
     if fit.total_before.interval[0] > 0:

@@ -144,8 +144,18 @@ def of_labels(
     )
 
 
-def of_left(verdict: Verdict, fit: Improvement, sealed: Improvement | None) -> tuple[str, ...]:
-    """Returns where an error is left of a model that is said to explain the pours."""
+def of_left(
+    verdict: Verdict, fit: Improvement, sealed: Improvement | None, *, is_taken_back: bool = False
+) -> tuple[str, ...]:
+    """Returns where an error is left of a model that is said to explain the pours.
+
+    Args:
+        verdict: the word.
+        fit: error before and after, conditions to fit.
+        sealed: the same of the sealed ones.
+        is_taken_back: whether the fits named what the word does not: the error after is of that,
+            the word of the base model.
+    """
     if verdict.kind not in (*NAMING, "NONE"):
         return ()
     left = [
@@ -153,7 +163,9 @@ def of_left(verdict: Verdict, fit: Improvement, sealed: Improvement | None) -> t
         f"{after.interval[1]:.3g}"
         for use, error in (("fitted", fit), ("sealed", sealed))
         if error is not None
-        for label, after in zip(error.labels, error.after, strict=True)
+        for label, after in zip(
+            error.labels, error.before if is_taken_back else error.after, strict=True
+        )
         if after.interval[0] > 0
     ]
     if not left:
