@@ -1,15 +1,19 @@
 """From p-values and evidences to a word: no effect is a rival like any other."""
 
-from typing import cast
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from granulcal.loop import Design, Effect
+from granulcal.loop.closed import Closed
+from granulcal.loop.effects.library import by_name
 from granulcal.loop.surrogate.baseline import Fit
 from granulcal.loop.test.refit import Model
 from granulcal.loop.test.residual_test import ResidualTest
 from granulcal.loop.test.thresholds import Thresholds
+from granulcal.loop.test.trace import Explanation, Trace
 from granulcal.loop.test.verdict import Verdict, decide
 
 RULES = Thresholds()
@@ -79,3 +83,52 @@ def test_a_second_effect_is_told_from_none_as_a_first_one_is() -> None:
     # A rival of the member that leaves nothing is named beside it.
     found = word((model(22.0, 0, 2), 0.5), *left, (model(18.0, 1), 0.5))
     assert (found.kind, found.named) == ("SET", ("count", "tilt"))
+
+
+def explained(*of: tuple[tuple[str, ...], float, float]) -> tuple[Explanation, ...]:
+    """Explanations by effects, log probability and the strength of each effect."""
+    return tuple(
+        Explanation(
+            effects=names,
+            theta=np.empty(0),
+            strengths=np.full(len(names), strength),
+            intervals=np.tile([strength - 0.1, strength + 0.1], (len(names), 1)),
+            best_strengths=np.full(len(names), strength),
+            log_probability=log_probability,
+            p_after=0.5,
+            at_end=False,
+        )
+        for names, log_probability, strength in of
+    )
+
+
+def test_the_strength_of_a_name_is_not_that_of_a_pair_that_gave_way() -> None:
+    # None alone is adequate, and the pair is no 3 nat above the better of its members.
+    found = word((model(22.0, 0, 2), 0.5), (model(20.0, 0), 0.001), (model(5.0, 2), 0.001))
+    assert (found.kind, found.named) == ("EFFECT", ("drag",))
+    explanations = explained((("drag", "count"), 22.0, 0.3), (("drag",), 20.0, 0.6))
+    trace = SimpleNamespace(verdict=found, explanations=explanations, best=explanations[1])
+    own = SimpleNamespace(strengths=np.array([0.65]), intervals=np.array([[0.6, 0.7]]))
+    closed = SimpleNamespace(
+        trace=trace,
+        standing=SimpleNamespace(own=own),
+        calibrated=None,
+        task=SimpleNamespace(effect=lambda name: by_name([name])[0]),
+    )
+    full = by_name(["drag"])[0].full
+    strengths = Closed.strengths(cast(Any, closed))
+    assert strengths["drag"] == pytest.approx((0.6 * full, 0.65 * full, 0.7 * full))
+    # By fits alone as well.
+    closed.standing.own = None
+    strengths = Closed.strengths(cast(Any, closed))
+    assert strengths["drag"] == pytest.approx((0.5 * full, 0.6 * full, 0.7 * full))
+
+
+def test_the_model_of_a_set_is_one_of_its_members() -> None:
+    singles = (model(20.0, 1), 0.001), (model(16.5, 0), 0.5), (model(16.0, 2), 0.5)
+    found = word((model(18.0, 0, 2), 0.5), *singles)
+    assert (found.kind, found.named) == ("SET", ("drag", "count"))
+    explanations = explained((("drag", "count"), 18.0, 0.3), (("drag",), 16.5, 0.6))
+    trace = SimpleNamespace(verdict=found, explanations=explanations, base=None)
+    best = cast(property, Trace.best).fget
+    assert best is not None and best(trace) is explanations[1]

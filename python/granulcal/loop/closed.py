@@ -97,13 +97,17 @@ class Closed:
         simulated pairs were poured for the interval is theirs.
         """
         found: dict[str, tuple[float, float, float]] = {}
-        own = self.standing.own
-        for one in self.trace.explanations:
+        own, best = self.standing.own, self.trace.best
+        # A pair may be more probable than the effect of it that is named, and has another strength.
+        others = sorted(
+            self.trace.explanations, key=lambda one: (one is not best, len(one.effects))
+        )
+        for one in others:
             strengths, intervals = one.strengths, one.intervals
-            if one is self.trace.best and own is not None:
+            if one is best and own is not None:
                 strengths, intervals = own.strengths, own.intervals
             for name, middle, (low, high) in zip(one.effects, strengths, intervals, strict=True):
-                if one is self.trace.best and self.calibrated is not None:
+                if one is best and self.calibrated is not None:
                     low, high = self.calibrated.interval
                 if name in self.trace.verdict.named and name not in found:
                     effect = self.task.effect(name)

@@ -166,8 +166,11 @@ class Trace:
     def best(self) -> Explanation:
         """The explanation that the verdict rests on, or the base model."""
         if self.verdict.kind in NAMING:
-            first = self.verdict.named[0]
+            first, is_set = self.verdict.named[0], self.verdict.kind == "SET"
             for one in self.explanations:
+                if is_set and len(one.effects) > 1:
+                    # Each of a set by itself; a pair of two of them gave way.
+                    continue
                 if first in one.effects and set(one.effects) <= set(self.verdict.named):
                     return one
         return self.base
