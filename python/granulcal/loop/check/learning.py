@@ -70,6 +70,6 @@ def learning(
         surrogate=again.surrogate,
         best=seen.best,
         draws=seen.draws,
-        drawn_of=seen.trace.best.effects,
+        drawn_of=seen.of,
         pours=near.pours + beside.pours + again.pours,
     )

@@ -30,13 +30,16 @@ class PriorCheck:
         trace: of the surrogate that knows the pours of the rounds.
         surrogate: that surrogate.
         draws: random draws that were poured of the models in turn.
-        best: pours of the verdict's model; None where nothing was usable or none was asked for.
+        best: pours of the verdict's model; None where nothing was usable, none was asked for, or
+            the last round has changed the winner once more.
+        of: effects of the model that the last round's draws were of.
     """
 
     trace: Trace
     surrogate: Surrogate
     draws: int
     best: PriorPours | None
+    of: tuple[str, ...]
 
 
 def prior_rounds(
@@ -49,6 +52,7 @@ def prior_rounds(
     """Returns the trace after random draws of its winner were poured."""
     rules, seed, say = analysis.rules, analysis.seed, analysis.say
     spread, draws, best = _spread(analysis, surrogate), 0, None
+    winner = found.best.effects
     for number in range(ROUNDS if rules.look else 0):
         winner = found.best.effects
         best = prior_pours(analysis, found, measured, spread, number)
@@ -67,7 +71,7 @@ def prior_rounds(
             break
     if best is not None and (best.effects != found.best.effects or len(best.theta) == 0):
         best = None
-    return PriorCheck(found, surrogate, draws, best)
+    return PriorCheck(found, surrogate, draws, best, winner)
 
 
 def drawn(
