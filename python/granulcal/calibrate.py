@@ -234,6 +234,7 @@ def _told(
     page = write_report(
         report,
         observed=observed.mean(axis=0),
+        observed_count=len(observed),
         posterior=posterior,
         pours=pours,
         prior_pours=prior_pours,

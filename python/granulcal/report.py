@@ -92,6 +92,7 @@ def write_report(
     *,
     observed: ArrayLike,
     observed_points: ArrayLike | None = None,
+    observed_count: int = 1,
     posterior: "Posterior",
     pours: Sequence[Pour],
     data: Dataset,
@@ -109,9 +110,11 @@ def write_report(
 
     Args:
         path: the HTML file.
-        observed: measured statistics as `data` has them, shape (s,).
-        observed_points: points of the measured formation [m], shape (n, 3), centred; None where
-            what was measured is no image: pictures and profile are left out.
+        observed: measured statistics as `data` has them, of several measurements their mean,
+            shape (s,).
+        observed_points: points of the measured formation [m], of several the first, shape (n, 3),
+            centred; None where what was measured is no image: pictures and profile are left out.
+        observed_count: how many measurements there are.
         posterior: the inferred parameters.
         pours: pours at the posterior's mode, one for each seed, at least one.
         data: the pours that the model was trained on.
@@ -143,6 +146,7 @@ def write_report(
         summary=summary,
         notes=[*notes, *(str(warning) for warning in posterior.warnings)],
         command=command,
+        observed_count=observed_count,
         formations=formations,
         profile=profile,
         drawn_count=len(drawn),

@@ -115,6 +115,25 @@ def test_the_page_says_whether_the_measurement_is_inside_the_model(page):
     assert text.count("too large") == 1
 
 
+def test_the_page_of_several_recordings_says_which_one_it_shows(
+    page, posterior, small_data, small_pour, tmp_path
+):
+    of_two = write_report(
+        tmp_path / "report.html",
+        observed=small_pour.statistics().paper16,
+        observed_points=small_pour.points(),
+        observed_count=2,
+        posterior=posterior,
+        pours=[small_pour],
+        drawn=[small_pour],
+        data=small_data,
+    )
+    text = of_two.read_text(encoding="utf-8")
+    assert text.count("the first of 2 recordings") == 2
+    assert text.count("the means of 2 measurements") == 2
+    assert "the first of" not in page.read_text(encoding="utf-8")
+
+
 def test_a_report_without_pours_is_refused(posterior, small_data, tmp_path):
     with pytest.raises(ValueError, match="at least one pour"):
         write_report(
