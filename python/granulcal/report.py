@@ -29,6 +29,7 @@ from granulcal.pours.statistics import DOCS
 
 if TYPE_CHECKING:
     from granulcal.bayessim import Calibration
+    from granulcal.bayessim.check.identifiability import Identifiability
     from granulcal.bayessim.check.misfit import Misfit
     from granulcal.bayessim.posterior.posterior import Posterior
 
@@ -131,12 +132,14 @@ def write_report(
     Raises:
         ValueError: no pour, a pour without grains in view, or masked entries.
     """
+    from granulcal.bayessim.check.identifiability import Identifiability
+
     if not pours:
         raise ValueError("a report needs at least one pour at the posterior's mode, got none")
     measured = np.asarray(unmasked("observed", observed), dtype=float)
     scale = Scale.of(data)
     simulated = [_of_pour(pour, data) for pour in pours]
-    scene = data.scene
+    scene, known = data.scene, Identifiability.of(posterior)
     formations, profile = None, None
     if observed_points is not None:
         points = np.asarray(unmasked("observed_points", observed_points), dtype=float)
@@ -151,7 +154,8 @@ def write_report(
         profile=profile,
         drawn_count=len(drawn),
         pairs=_pair_plot(posterior, truth),
-        parameters=_parameters(posterior, truth),
+        parameters=_parameters(posterior, known, truth),
+        directions=known.directions,
         assumed=assumed(data.scene_toml, posterior.prior),
         has_truth=truth is not None,
         statistics=comparison_table(measured, simulated, scale, scene.units_of(data.x_names)),
@@ -226,7 +230,11 @@ def data_uri(png: bytes) -> str:
     return "data:image/png;base64," + base64.b64encode(png).decode("ascii")
 
 
-def _parameters(posterior: "Posterior", truth: ArrayLike | None) -> list[dict[str, Any]]:
+def _parameters(
+    posterior: "Posterior", identifiability: "Identifiability", truth: ArrayLike | None
+) -> list[dict[str, Any]]:
+    from granulcal.bayessim.check.identifiability import NO_TRACE
+
     region, mode, mean = posterior.credible_region(0.9), posterior.mode(), posterior.mean()
     true_values = [None] * len(posterior.names) if truth is None else np.asarray(truth).tolist()
     rows = []
@@ -241,6 +249,8 @@ def _parameters(posterior: "Posterior", truth: ArrayLike | None) -> list[dict[st
                 "low": low,
                 "high": high,
                 "prior": parameter.in_words,
+                "gain": float(identifiability.gains[i]),
+                "has_no_trace": bool(identifiability.gains[i] < NO_TRACE),
                 "truth": known,
                 "is_inside": None if known is None else low <= known <= high,
             }

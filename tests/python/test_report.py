@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import granulcal as gc
+from granulcal.bayessim.check.identifiability import NO_TRACE, Identifiability
 from granulcal.bayessim.check.misfit import Misfit, StatisticMisfit
 from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.pours.formation_image import common_field, height_grid
@@ -132,6 +133,17 @@ def test_the_page_of_several_recordings_says_which_one_it_shows(
     assert text.count("the first of 2 recordings") == 2
     assert text.count("the means of 2 measurements") == 2
     assert "the first of" not in page.read_text(encoding="utf-8")
+
+
+def test_the_page_says_which_parameters_left_no_trace(page, posterior):
+    text = page.read_text(encoding="utf-8")
+    known = Identifiability.of(posterior)
+    for gain in known.gains:
+        assert f"<td>{gain:.2f}" in text
+    # One in the table for each, and one below where there is any.
+    none = int((known.gains < NO_TRACE).sum())
+    assert text.count(">no trace</span>") == none + (none > 0)
+    assert f"{known.effective_dimension:.1f} of 3 directions are known" in text
 
 
 def test_a_report_without_pours_is_refused(posterior, small_data, tmp_path):

@@ -98,16 +98,21 @@ class Identifiability:
         lists = {name: tuple(values[name]) for name in ("names", "blind")}
         return cls(**{**values, **arrays, **lists})
 
+    @property
+    def directions(self) -> str:
+        """How many directions are known, and along which least is, in words."""
+        short = short_names(self.names)
+        ridge = " ".join(f"{part:+.2f} {n}" for n, part in zip(short, self.ridge, strict=True))
+        return (
+            f"{self.effective_dimension:.1f} of {len(short)} directions are known; least along "
+            f"{ridge}, where {self.ridge_spread:.0%} of the prior's spread is left"
+        )
+
     def __str__(self) -> str:
         """A few lines in plain words."""
         short = short_names(self.names)
         told = ", ".join(f"{n} {g:.2f}" for n, g in zip(short, self.gains, strict=True))
-        ridge = " ".join(f"{part:+.2f} {n}" for n, part in zip(short, self.ridge, strict=True))
-        lines = [
-            f"  information gained [nat]: {told}",
-            f"  {self.effective_dimension:.1f} of {len(short)} directions are known; least along "
-            f"{ridge}, where {self.ridge_spread:.0%} of the prior's spread is left",
-        ]
+        lines = [f"  information gained [nat]: {told}", f"  {self.directions}"]
         return "\n".join(lines + [f"  no trace: {line}" for line in self.blind])
 
 
