@@ -116,6 +116,27 @@ def test_the_page_says_whether_the_measurement_is_inside_the_model(page):
     assert text.count("too large") == 1
 
 
+def test_pours_of_two_materials_are_told_as_such(posterior, small_data, small_pour, tmp_path):
+    of_two = write_report(
+        tmp_path / "report.html",
+        observed=small_pour.statistics().paper16,
+        observed_count=2,
+        posterior=posterior,
+        pours=[small_pour],
+        misfit=Misfit(
+            pours=2,
+            p_value=0.005,
+            joint_p_value=0.6,
+            scatter_p_value=0.005,
+            statistics=(StatisticMisfit("max_z", 0.5, 0.9),),
+        ),
+        data=small_data,
+    )
+    text = of_two.read_text(encoding="utf-8")
+    assert "these 2 pours differ more from each other than pours of one material do" in text
+    assert "no parameters explain" not in text and "best compromise" not in text
+
+
 def test_the_page_of_several_recordings_says_which_one_it_shows(
     page, posterior, small_data, small_pour, tmp_path
 ):

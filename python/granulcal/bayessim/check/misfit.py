@@ -88,6 +88,13 @@ class Misfit:
         """Whether the model explains the observation; wrong in 5 % of right models."""
         return self.p_value >= SIGNIFICANCE
 
+    @property
+    def is_of_several(self) -> bool:
+        """Whether what speaks most against the model is how much the pours differ: see `text`."""
+        others = min([self.joint_p_value, *(each.p_value for each in self.statistics)])
+        scatter = self.scatter_p_value
+        return not self.is_inside and scatter is not None and scatter <= others
+
     def __str__(self) -> str:
         """One or two lines."""
         return self.text
