@@ -50,14 +50,14 @@ def at_once(
 def _on_threads(
     work: Callable[[Of], Row], each: Sequence[Of], threads: int
 ) -> Generator[tuple[int, Row], None, None]:
-    with ThreadPoolExecutor(threads) as workers:
+    workers = ThreadPoolExecutor(threads)
+    try:
         jobs = {workers.submit(work, one): place for place, one in enumerate(each)}
-        try:
-            for job in as_completed(jobs):
-                yield jobs[job], job.result()
-        except BaseException:
-            workers.shutdown(wait=False, cancel_futures=True)
-            raise
+        for job in as_completed(jobs):
+            yield jobs[job], job.result()
+    finally:
+        # Whoever stops it, by Ctrl-C above all, does not wait for the pours that are under way.
+        workers.shutdown(wait=False, cancel_futures=True)
 
 
 def _on_cluster(
