@@ -13,8 +13,10 @@ from granulcal import _native
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["beside", "replace_file", "save_figure", "write_beside", "write_toml"]
+__all__ = ["DATA_SET", "beside", "replace_file", "save_figure", "write_beside", "write_toml"]
 
+DATA_SET = "manifest.toml"
+"""What every folder of `generate` has, and no other."""
 _TRIES = 100
 
 

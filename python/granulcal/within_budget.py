@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.errors import DoubtfulRecordingWarning, PriorError, TrainingDataError
+from granulcal.files import DATA_SET
 from granulcal.measured.different import require_different
 from granulcal.measured.recording import Recording
 from granulcal.pours.cluster import Cluster, cluster_asked, spread_over
@@ -182,10 +183,16 @@ def calibrate_observed(
 
 
 def _file_in(out: str | PathLike[str]) -> Path:
-    """The file of kept pours in a folder, which is made."""
+    """The file of kept pours in a folder, which is made; a data set has one of its own."""
     folder = Path(out)
+    file = folder / "pours.json"
+    if (folder / DATA_SET).is_file() and not file.exists():
+        raise ValueError(
+            f"{folder} is a data set of `generate`: these pours are made for the recordings alone "
+            "and no part of it; give another folder"
+        )
     folder.mkdir(parents=True, exist_ok=True)
-    return folder / "pours.json"
+    return file
 
 
 def _inferred(

@@ -60,6 +60,13 @@ def test_a_posterior_says_what_it_is_of(tmp_path, capfd):
     assert "\nparameters: none\n" in _told(capfd, path)
 
 
+def test_a_data_set_is_one_whatever_else_lies_in_its_folder(tmp_path, capfd):
+    prior = gc.Prior.default()
+    gc.generate(gc.Scene.drop(0.02, count=5), prior, 1, seed=1, out=tmp_path)
+    (tmp_path / "posterior.json").write_text(json.dumps(POSTERIOR))
+    assert json.loads(_told(capfd, tmp_path, "--json"))["kind"] != "posterior"
+
+
 def test_other_documents_are_refused_by_name(tmp_path, capfd):
     for text, why in (("{", "truncated or not JSON"), ('{"key": "x"}', "recordings must be there")):
         path = tmp_path / "pours.json"

@@ -103,6 +103,21 @@ def test_too_few_usable_pours_are_told_by_why(tmp_path):
         calibrate_within(scene, prior, [recording], budget=60, out=tmp_path, engine=engine)
 
 
+def test_a_data_set_is_no_place_for_the_pours_of_recordings(tmp_path):
+    scene, prior = Scene.drop(0.02, count=20), Prior.default()
+    centres, radii = scene.start(1)
+    camera = gc.Camera.overhead(height=0.29, field_width=0.58, pixels=150)
+    depth = camera.render(centres, radii)
+    recording = gc.Recording.from_depth(depth, fx=75.0, fy=75.0, cx=74.5, cy=74.5)
+    (tmp_path / "manifest.toml").touch()
+    with (
+        pytest.warns(UserWarning),
+        pytest.raises(ValueError, match="is a data set of `generate`.*give another folder"),
+    ):
+        calibrate_within(scene, prior, [recording], budget=60, out=tmp_path)
+    assert [each.name for each in tmp_path.iterdir()] == ["manifest.toml"]
+
+
 def test_pours_are_kept_and_never_made_twice(tmp_path):
     scene = Scene.drop(0.02, count=20)
     prior = Prior(

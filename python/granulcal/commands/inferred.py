@@ -12,6 +12,7 @@ from granulcal.commands.exit_code import DONE
 from granulcal.commands.reading import TRAINING
 from granulcal.design.posterior_file import POSTERIOR_JSON
 from granulcal.documents import Flag, ListOf, Mapping, Maybe, Number, Table, Text, read_json
+from granulcal.files import DATA_SET
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 from granulcal.starter.models import is_built_in, model_named
@@ -68,6 +69,9 @@ def _what(path: Path) -> str | None:
     """The name of the document that is inspected; None for what is granulcal-cli's to read."""
     if path.is_file() and path.suffix.lower() == ".json":
         return MODEL_JSON if path.name == MODEL_JSON else POSTERIOR_JSON
+    if (path / DATA_SET).is_file():
+        # Of a data set, whatever else lies in its folder.
+        return None
     documents = (MODEL_JSON, POSTERIOR_JSON)
     return next((name for name in documents if (path / name).is_file()), None)
 
