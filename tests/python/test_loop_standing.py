@@ -25,7 +25,7 @@ from granulcal.loop.report.page import sentence_of
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.loop.test.distance import Improvement, compare
 from granulcal.loop.test.thresholds import Thresholds
-from granulcal.loop.test.verdict import Verdict
+from granulcal.loop.test.verdict import Verdict, families_of
 from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
@@ -233,6 +233,17 @@ def test_a_verdict_that_a_definition_overturns_is_none() -> None:
     found = stand(EFFECT, RULES, confirmed=0.5, moved=[Moved("half cover", NONE)])
     assert found.verdict.kind == "OVERTURNED" and not found.stands
     assert found.verdict.reason == "the fits say EFFECT drag, but NONE under half cover"
+
+
+def test_the_same_name_by_another_definition_does_not_overturn_it() -> None:
+    # There drag and dry cohesion are parallel, and count with the first of the two.
+    effects = (Effect("cohesion.dry", family="cohesion"), Effect("drag"))
+    design = Design(("mu",), ("height",), effects)
+    there = families_of(design, (1,), [(0, 1)])
+    assert there == ("cohesion",)
+    same = Verdict("EFFECT", ("drag",), there, 0.001, "")
+    assert not overturned(EFFECT, same, 0.01) and not overturned(same, EFFECT, 0.01)
+    assert stand(EFFECT, RULES, confirmed=0.5, moved=[Moved("half", same)]).verdict is EFFECT
 
 
 def test_what_no_pour_shows_is_beside_what_nothing_explains() -> None:

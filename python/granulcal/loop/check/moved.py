@@ -39,7 +39,9 @@ def overturned(verdict: Verdict, other: Verdict, name: float) -> bool:
         name: largest p at which something may be named.
     """
     if verdict.kind in NAMING:
-        return not set(verdict.families) & set(other.families)
+        # What is parallel, and counts as one family, is another under each definition.
+        both = ({*one.families, *one.named} for one in (verdict, other))
+        return not set.intersection(*both)
     if verdict.kind == "NONE":
         return other.p <= name
     return other.kind == "NONE"
