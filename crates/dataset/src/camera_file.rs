@@ -94,7 +94,7 @@ impl CameraFile {
     /// numbers that no camera has and for a lens of which a part is missing.
     pub fn parse(path: &Path, text: &str) -> Result<Self, DatasetError> {
         let file: CameraToml = toml::from_str(text)
-            .map_err(|source| toml_error(path, "camera", text, Box::new(source)))?;
+            .map_err(|source| toml_error(path, "camera", text, Box::new(source.into())))?;
         file.depth_unit.map_or(Ok(()), |unit| require_unit(path, unit))?;
         Ok(Self {
             lens: file.lens(path)?,

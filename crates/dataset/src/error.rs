@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use granulcal_dem::DemError;
 use granulcal_features::FeatureError;
-use granulcal_scene::SceneError;
+use granulcal_scene::{SceneError, TomlFault};
 
 /// Why a file, a prior or a batch was refused, or could not be written.
 ///
@@ -65,7 +65,7 @@ pub enum DatasetError {
         what: &'static str,
         /// Where and why.
         #[source]
-        source: Box<toml::de::Error>,
+        source: Box<TomlFault>,
     },
     /// Another simulator did not give a pour.
     #[error("{name} gave no pour: {reason}")]

@@ -53,9 +53,12 @@ impl Manifest {
         if !path.exists() {
             return Ok(None);
         }
-        let contents: Contents = toml::from_str(&files::read_text(&path)?).map_err(|source| {
-            DatasetError::Toml { path: path.clone(), what: "manifest", source: Box::new(source) }
-        })?;
+        let contents: Contents =
+            toml::from_str(&files::read_text(&path)?).map_err(|source| DatasetError::Toml {
+                path: path.clone(),
+                what: "manifest",
+                source: Box::new(source.into()),
+            })?;
         let refuse = |what: &str, found: u64, allowed: &str| {
             Err(DatasetError::content(&path, what, found.to_string(), allowed))
         };

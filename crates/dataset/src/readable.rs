@@ -4,6 +4,8 @@
 use std::borrow::Cow;
 use std::path::Path;
 
+use granulcal_scene::TomlFault;
+
 use crate::DatasetError;
 
 /// Letters of a line, and lines of a message, that are shown.
@@ -51,7 +53,7 @@ pub(crate) fn toml_error(
     path: &Path,
     what: &'static str,
     text: &str,
-    source: Box<toml::de::Error>,
+    source: Box<TomlFault>,
 ) -> DatasetError {
     let named = path.canonicalize().unwrap_or_default();
     if named.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {

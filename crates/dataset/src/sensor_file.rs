@@ -40,7 +40,7 @@ pub fn save_sensor(path: &Path, sensor: &DepthSensor) -> Result<(), DatasetError
 pub fn load_sensor(path: &Path) -> Result<DepthSensor, DatasetError> {
     let text = files::read_text(path)?;
     let file: SensorToml = toml::from_str(&text)
-        .map_err(|source| toml_error(path, "sensor", &text, Box::new(source)))?;
+        .map_err(|source| toml_error(path, "sensor", &text, Box::new(source.into())))?;
     let sensor = file.camera.sensor;
     sensor
         .check("camera.sensor")

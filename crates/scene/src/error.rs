@@ -2,6 +2,8 @@
 
 use granulcal_numbers::General;
 
+use crate::toml_fault::TomlFault;
+
 /// Everything that this crate refuses. Each variant names the thing, what was found and what is allowed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -18,7 +20,7 @@ pub enum SceneError {
     },
     /// The scene's TOML could not be read.
     #[error("scene is not valid TOML of a scene")]
-    Toml(#[source] Box<toml::de::Error>),
+    Toml(#[source] Box<TomlFault>),
     /// The scene could not be written as TOML.
     #[error("scene cannot be written as TOML")]
     TomlWrite(#[source] Box<toml::ser::Error>),
@@ -161,7 +163,7 @@ pub enum SceneError {
     },
     /// The text of a prior is not the TOML of a prior.
     #[error("not the TOML of a prior")]
-    PriorToml(#[source] Box<toml::de::Error>),
+    PriorToml(#[source] Box<TomlFault>),
     /// The prior could not be written as TOML.
     #[error("the prior cannot be written as TOML")]
     PriorTomlWrite(#[source] Box<toml::ser::Error>),

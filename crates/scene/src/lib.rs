@@ -39,6 +39,7 @@ mod start;
 mod sweep;
 mod symmetry;
 mod together;
+mod toml_fault;
 mod uniforms;
 mod view;
 mod walls;
@@ -75,5 +76,6 @@ pub use sensor::{
     DepthSensor, GRAZING_DEG, NoiseField, StereoSensor, TimeOfFlightSensor, round_to,
 };
 pub use start::Start;
+pub use toml_fault::TomlFault;
 pub use view::ViewSpec;
 pub use walls::{BoxSide, Ends, Funnel, Ground, Shape, Wall};

@@ -8,6 +8,7 @@ use toml::{Table, Value};
 
 use crate::error::SceneError;
 use crate::scene::Scene;
+use crate::toml_fault::in_plain_words;
 
 impl Scene {
     /// A copy with the number at `path` set to `value`, checked like any scene.
@@ -31,7 +32,7 @@ impl Scene {
         }
         let paths: Vec<_> = values.iter().map(|(path, _)| *path).collect();
         let mut changed: Self = Value::Table(tree).try_into().map_err(|e: toml::de::Error| {
-            self.with_hint(not_a_scene(&paths.join(", "), e.message()), &paths)
+            self.with_hint(not_a_scene(&paths.join(", "), &in_plain_words(e.message())), &paths)
         })?;
         changed.take_meshes(self);
         changed.check()?;

@@ -89,7 +89,8 @@ impl Prior {
     /// # Errors
     /// [`SceneError::PriorToml`] for what is not TOML of a prior (unknown keys included), else as [`Prior::new`].
     pub fn from_toml(text: &str) -> Result<Self, SceneError> {
-        let file: File = toml::from_str(text).map_err(|e| SceneError::PriorToml(Box::new(e)))?;
+        let file: File =
+            toml::from_str(text).map_err(|e| SceneError::PriorToml(Box::new(e.into())))?;
         let parameters = file.parameter.into_iter().map(Entry::into_parameter);
         Self::new(parameters.collect::<Result<_, _>>()?)
     }

@@ -138,7 +138,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError::Toml`] for what is not TOML of a scene.
     pub fn parse(text: &str) -> Result<Self, SceneError> {
-        toml::from_str(text).map_err(|e| SceneError::Toml(Box::new(e)))
+        toml::from_str(text).map_err(|e| SceneError::Toml(Box::new(e.into())))
     }
 
     /// The scene as TOML; [`Scene::from_toml`] reads it back unchanged.
