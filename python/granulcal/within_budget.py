@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from granulcal.errors import DoubtfulRecordingWarning, PriorError, TrainingDataError
 from granulcal.files import DATA_SET
 from granulcal.measured.different import require_different
+from granulcal.measured.plausible import doubts_of_frames
 from granulcal.measured.recording import Recording
 from granulcal.pours.cluster import Cluster, cluster_asked, spread_over
 from granulcal.pours.kept_pours import KeptPours
@@ -71,7 +72,8 @@ def calibrate_within(
             that were made for other recordings.
 
     Warns:
-        DoubtfulRecordingWarning: what `Recording.doubts` says, or a funnel above the camera.
+        DoubtfulRecordingWarning: what `Recording.doubts` says, recordings that are frames of one
+            pour, or a funnel above the camera.
     """
     from granulcal.bayessim.training.sequential import round_sizes
     from granulcal.loop.recorded import doubt_of_funnel
@@ -88,6 +90,8 @@ def calibrate_within(
     for each in recordings:
         for doubt in each.doubts(scene, prior):
             warnings.warn(f"{each.path}: {doubt}", DoubtfulRecordingWarning, stacklevel=2)
+    for doubt in doubts_of_frames(scene, prior, recordings, [each.path for each in recordings]):
+        warnings.warn(doubt, DoubtfulRecordingWarning, stacklevel=2)
     formations = [each.formation(**scene.reading) for each in recordings]
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])
     require_different(observed)

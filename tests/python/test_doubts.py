@@ -5,6 +5,7 @@ import pytest
 
 import granulcal as gc
 from granulcal import _native
+from granulcal.measured.plausible import doubts, doubts_of_frames
 
 TEXT = """
 name = "small funnel"
@@ -110,6 +111,21 @@ def test_depths_in_another_unit_are_asked_for_by_the_distance_of_the_ground(
     at = f"the ground is {0.35 * times:.4g} m from the camera, of the scene's images 0.35 m"
     (asked,) = [text for text in told if text.startswith(at)]
     assert asked.endswith("is the unit of the depths right (depth_unit)?")
+
+
+def test_frames_of_one_pour_are_told_and_pours_are_not(scene, prior, heap):
+    """Five frames of one pour, given one by one, had counted as five pours without a word."""
+    other = gc.simulate(scene, seed=3).depth_image()
+    noise = np.random.default_rng(1)
+    first, again, second = (
+        seen(depth + noise.normal(0.0, 2e-4, depth.shape)) for depth in (heap, heap, other)
+    )
+    names = ["a.png", "b.png", "c.png"]
+    (told,) = doubts_of_frames(scene, prior, [first, again, second], names)
+    assert told.startswith("a.png, b.png show the same grains") and "into a folder" in told
+    assert told in doubts(scene, prior, [first, again, second], names)
+    assert doubts_of_frames(scene, prior, [first, second], names[:2]) == []
+    assert doubts_of_frames(scene, prior, [first], names[:1]) == []
 
 
 def test_a_height_map_tells_no_distance(scene, prior, heap, tmp_path):

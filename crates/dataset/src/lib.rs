@@ -99,7 +99,7 @@ pub use observer::{
     observed_statistics,
 };
 pub use pictures::{Pictures, write_mask, write_pictures};
-pub use plausible::{LEAST_SHOWN, Limits, UNIT_FACTOR};
+pub use plausible::{LEAST_SHOWN, Limits, Places, UNIT_FACTOR};
 pub use readable::{plain, readable};
 pub use recording::{
     FRAMES, Folder, Frame, ReadOptions, Recording, Source, camera_beside, measured_data,

@@ -11,10 +11,12 @@ use granulcal_scene::{Mask, Prior, Projection, Scene};
 
 mod bare;
 mod doubts;
+mod frames;
 
 use crate::{DatasetError, Room};
 use bare::Bare;
 pub use doubts::{LEAST_SHOWN, UNIT_FACTOR};
+pub use frames::Places;
 
 /// Factor on the height in which the grains start.
 const HEIGHT_MARGIN: f64 = 1.5;

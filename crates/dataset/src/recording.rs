@@ -183,7 +183,7 @@ impl Recording {
     }
 
     /// A recording of one frame.
-    fn of_one(path: PathBuf, source: Source, segmentation: Segmentation) -> Self {
+    pub(crate) fn of_one(path: PathBuf, source: Source, segmentation: Segmentation) -> Self {
         Self {
             path,
             source,

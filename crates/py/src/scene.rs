@@ -104,6 +104,24 @@ impl Scene {
         self.judged(py, prior_toml, recording, settings, Limits::doubts_of)
     }
 
+    /// What is said of recordings that are frames of one pour, and not pours of their own.
+    fn doubts_of_frames(
+        &self,
+        py: Python<'_>,
+        prior_toml: &str,
+        names: Vec<String>,
+        recordings: Vec<Py<Recording>>,
+    ) -> PyResult<Vec<String>> {
+        let prior = Prior::from_toml(prior_toml).map_err(error::dem)?;
+        let all: Vec<_> = recordings.iter().map(|each| &each.get().inner).collect();
+        let found = py.detach(|| {
+            let Some(limits) = Limits::of(&self.inner, &prior)? else { return Ok(Vec::new()) };
+            let places: Vec<_> = all.into_iter().map(|each| limits.places_of(each)).collect();
+            Ok(limits.doubts_of_frames(&names, &places))
+        });
+        found.map_err(error::dataset)
+    }
+
     fn to_toml(&self) -> PyResult<String> {
         self.inner.to_toml().map_err(error::dem)
     }

@@ -19,7 +19,7 @@ from granulcal.loop.condition import Condition, digest_of
 from granulcal.loop.effects.library import LibraryEffect
 from granulcal.loop.pours.measures import camera_used
 from granulcal.measured.different import first_copy
-from granulcal.measured.plausible import doubts, violations
+from granulcal.measured.plausible import doubts, doubts_of_frames, violations
 from granulcal.measured.recording import Formation, Recording, UnlikeFramesWarning
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
@@ -103,8 +103,10 @@ def _doubts_of_one(
     found: list[str] = []
     missing: list[float] = []
     distances: list[float] = []
+    opened: list[Recording] = []
     for path in condition.recordings:
         recording = _opened(path, condition)
+        opened.append(recording)
         of_it = ([recording], [path], condition.reading)
         impossible = violations(there, prior, *of_it)
         if impossible and all(violations(s, prior, *of_it) for s in _with_effects(there, library)):
@@ -119,6 +121,7 @@ def _doubts_of_one(
         formation = recording.formation(**settings)
         missing.append(_missing_share(formation))
         distances.append(abs(formation.plane.offset))
+    found += doubts_of_frames(there, prior, opened, condition.recordings)
     of_funnel = doubt_of_funnel(condition.name, there)
     of_all = [*of_funnel, *_doubt_of_missing(there, condition, missing), *found]
     return of_all, distances[0]

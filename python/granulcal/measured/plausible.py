@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from granulcal.pours.scene import Scene
     from granulcal.prior import Prior
 
-__all__ = ["doubts", "violations"]
+__all__ = ["doubts", "doubts_of_frames", "violations"]
 
 
 def violations(
@@ -44,9 +44,33 @@ def doubts(
 
     A formation that the image's edge cuts off, that is longer than wide or takes less room than the
     scene's grains, a bent ground, an image without much data, a second heap; the bounds are those
-    of `infer`, the arguments those of `violations`.
+    of `infer`, the arguments those of `violations`. Of several what `doubts_of_frames` says, too.
     """
-    return _told(scene.native.doubts, prior, recordings, names, reading)
+    of_each = _told(scene.native.doubts, prior, recordings, names, reading)
+    return [*of_each, *doubts_of_frames(scene, prior, recordings, names)]
+
+
+def doubts_of_frames(
+    scene: "Scene",
+    prior: "Prior",
+    recordings: "Sequence[Recording]",
+    names: Sequence[object],
+) -> list[str]:
+    """Returns which neighbours in a list of recordings are frames of one pour, a sentence each.
+
+    Each recording counts as a pour of its own. Where grains lie at the same places in two of them,
+    pixel by pixel, they are none; a camera that was moved between its frames hides that.
+
+    Args:
+        scene: what was poured.
+        prior: of its parameters.
+        recordings: what was measured, given as pours of their own.
+        names: of the recordings, for the sentences.
+    """
+    if len(recordings) < 2:
+        return []
+    told, images = [str(name) for name in names], [each.native for each in recordings]
+    return scene.native.doubts_of_frames(prior.to_toml(), told, images)
 
 
 def _told(

@@ -3,6 +3,7 @@ use granulcal_scene::{Bed, DepthSensor, NoiseField, StereoSensor};
 
 use super::doubts::rounded_up;
 use super::*;
+use crate::{Recording, Source};
 
 /// A cone in the middle of a field of half a metre, 4 mm to a pixel.
 fn cone(height: f64, radius: f64) -> Formation {
@@ -219,4 +220,49 @@ fn what_a_scenes_sensor_does_to_its_own_images_is_no_doubt() {
     // The right imager misses a band of 67 + 11 of the 780 columns.
     assert!((limits.shown - 0.9).abs() < 0.02, "{}", limits.shown);
     assert!(limits.bow > 2e-4 && limits.bow < 4e-3, "{}", limits.bow);
+}
+
+/// Heights of grains, one to a patch of 3 × 3 pixels of 2 mm, of which `seed` says where they lie.
+fn scattered(seed: u64, noise: f64) -> Recording {
+    let side = 120;
+    let at = |pixel: usize, salt: u64| {
+        let number = (pixel as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(salt);
+        let mixed = (number ^ (number >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        ((mixed ^ (mixed >> 32)) % 1000) as f64 / 1000.0
+    };
+    let height = |pixel: usize| {
+        let patch = pixel / side / 3 * side + pixel % side / 3;
+        let grain = if at(patch, seed) < 0.05 { 3.6e-3 } else { 0.0 };
+        grain + noise * (at(pixel, seed + 1000 + (1e6 * noise) as u64) - 0.5)
+    };
+    let z = (0..side * side).map(height).collect();
+    let map = HeightMap::new(side, side, 2e-3, 2e-3, z).unwrap();
+    Recording::of_one("map.npz".into(), Source::Heights(map), Segmentation::default())
+}
+
+#[test]
+fn frames_of_one_pour_are_told_from_pours() {
+    let limits = Limits::of(&Scene::funnel(0.12), &Prior::default()).unwrap().unwrap();
+    let told = |recordings: &[Recording]| {
+        let names: Vec<_> = (0..recordings.len()).map(|i| format!("{i}.npz")).collect();
+        let places: Vec<_> = recordings.iter().map(|each| limits.places_of(each)).collect();
+        assert!(places.iter().all(Option::is_some));
+        limits.doubts_of_frames(&names, &places)
+    };
+    assert_eq!(told(&[scattered(1, 1e-4), scattered(2, 1e-4)]), Vec::<String>::new());
+    let frames = told(&[scattered(1, 1e-4), scattered(1, 2e-4)]);
+    assert!(
+        frames.len() == 1 && frames[0].starts_with("0.npz, 1.npz show the same grains"),
+        "{frames:?}"
+    );
+    // Two pours, the first seen three times, the second twice.
+    let of_both = [(1, 1e-4), (1, 2e-4), (1, 3e-4), (2, 1e-4), (2, 2e-4)];
+    let both = told(&of_both.map(|(seed, noise)| scattered(seed, noise)));
+    assert!(both.len() == 2, "{both:?}");
+    assert!(
+        both[0].starts_with("0.npz, 1.npz, 2.npz show") && both[1].starts_with("3.npz, 4.npz show")
+    );
+    // Pixels as wide as many grains tell nothing.
+    let fine = Limits { diameter: 5e-4, ..limits };
+    assert!(fine.places_of(&scattered(1, 1e-4)).is_none());
 }

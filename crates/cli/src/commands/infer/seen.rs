@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use granulcal_dataset::{Limits, ReadOptions, Recording};
+use granulcal_dataset::{Limits, Places, ReadOptions, Recording};
 use granulcal_scene::CameraSpec;
 
 use crate::args::paths::Reads;
@@ -41,14 +41,20 @@ impl Seen {
         require_different(recordings)?;
         let (observed, impossible, doubts) = (Vec::new(), Vec::new(), Vec::new());
         let mut seen = Self { observed, impossible, doubts, is_whole: true };
+        let mut places = Vec::new();
         for path in recordings {
-            seen.add(path, reading)?;
+            places.push(seen.add(path, reading)?);
         }
         require_no_copies(&seen.observed)?;
+        if let Some(limits) = reading.limits {
+            let names: Vec<_> = recordings.iter().map(|path| path.display().to_string()).collect();
+            seen.doubts.extend(limits.doubts_of_frames(&names, &places));
+        }
         Ok(seen)
     }
 
-    fn add(&mut self, path: &Reads, reading: &Reading<'_>) -> anyhow::Result<()> {
+    /// Adds a recording; returns where its grains lie.
+    fn add(&mut self, path: &Reads, reading: &Reading<'_>) -> anyhow::Result<Option<Places>> {
         let recording = Recording::open(path, &reading.options)?;
         for line in &recording.damage {
             note(&format!("warning: {line}"));
@@ -79,7 +85,7 @@ impl Seen {
             Err(_) if !self.impossible.is_empty() => Vec::new(),
             Err(error) => return Err(error.into()),
         });
-        Ok(())
+        Ok(reading.limits.and_then(|limits| limits.places_of(&recording)))
     }
 }
 
