@@ -1,5 +1,7 @@
 """What is said of recordings that a scene's own pours give, and of such that were spoiled."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -126,6 +128,17 @@ def test_frames_of_one_pour_are_told_and_pours_are_not(scene, prior, heap):
     assert told in doubts(scene, prior, [first, again, second], names)
     assert doubts_of_frames(scene, prior, [first, second], names[:2]) == []
     assert doubts_of_frames(scene, prior, [first], names[:1]) == []
+
+
+def test_an_image_where_one_stands_takes_the_camera_of_the_folder_above(tmp_path, monkeypatch):
+    """`camera.toml` above was found by `pours/0.png` and not by `0.png` from within pours/."""
+    (tmp_path / "pours").mkdir()
+    for name in ("camera.toml", "pours/0.png"):
+        (tmp_path / name).touch()
+    monkeypatch.chdir(tmp_path / "pours")
+    for name in ("0.png", "./0.png", "."):
+        found = _native.camera_beside(Path(name))
+        assert found is not None and found.resolve() == (tmp_path / "camera.toml").resolve()
 
 
 def test_a_height_map_tells_no_distance(scene, prior, heap, tmp_path):

@@ -30,9 +30,11 @@ pub struct ReadOptions {
 /// with, else `camera.toml` in its folder or the one above.
 fn camera_of_images_beside(path: &Path) -> Option<PathBuf> {
     let own = path.is_file().then(|| path.with_extension("toml"));
-    let folders = if path.is_dir() { path.ancestors().take(2) } else { path.ancestors().take(3) };
-    let skipped = usize::from(!path.is_dir());
-    let shared = folders.skip(skipped).map(|folder| folder.join("camera.toml"));
+    let folder = if path.is_dir() { path } else { path.parent()? };
+    // The folder above the one where one stands is in no path that is relative to it.
+    let is_here = folder.as_os_str().is_empty() || folder == Path::new(".");
+    let above = if is_here { Some(Path::new("..")) } else { folder.parent() };
+    let shared = [Some(folder), above].into_iter().flatten().map(|place| place.join("camera.toml"));
     own.into_iter().chain(shared).find(|file| file.is_file())
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use granulcal_dataset::{Limits, Places, ReadOptions, Recording};
+use granulcal_dataset::{Limits, Places, ReadOptions, Recording, camera_beside};
 use granulcal_scene::CameraSpec;
 
 use crate::args::paths::Reads;
@@ -42,6 +42,7 @@ impl Seen {
         let (observed, impossible, doubts) = (Vec::new(), Vec::new(), Vec::new());
         let mut seen = Self { observed, impossible, doubts, is_whole: true };
         let mut places = Vec::new();
+        tell_cameras(recordings, &reading.options);
         for path in recordings {
             places.push(seen.add(path, reading)?);
         }
@@ -86,6 +87,24 @@ impl Seen {
             Err(error) => return Err(error.into()),
         });
         Ok(reading.limits.and_then(|limits| limits.places_of(&recording)))
+    }
+}
+
+/// Says which cameras are taken that nobody named.
+fn tell_cameras(recordings: &[Reads], options: &ReadOptions) {
+    if options.camera.is_some() {
+        return;
+    }
+    let mut told = HashSet::new();
+    for path in recordings {
+        if let Some(camera) = camera_beside(path)
+            && told.insert(camera.clone())
+        {
+            let (image, camera) = (path.display(), camera.display());
+            note(&format!(
+                "note: {image} is read by the camera of {camera} (--camera names another)"
+            ));
+        }
     }
 }
 
