@@ -54,6 +54,8 @@ def test_tables_are_calibrated_by_the_statistics_that_all_of_them_have(
     low, high = told["parameters"]["material.rolling_friction"]["interval90"]
     assert low < 0.4 < high and high - low < 0.6
     assert told["recordings"] == ["a.csv", "b.csv"] and told["warnings"] == []
+    kept = json.loads((Path("run") / "posterior.json").read_text(encoding="utf-8"))
+    assert gc.Scene.from_toml(kept["scene_toml"]) == gc.Scene.load("scene.toml")
     # The folder is of these measurements, and goes on.
     assert main([*asked, "-o", "run"]) in (0, 3)
     capsys.readouterr()

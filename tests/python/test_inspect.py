@@ -56,6 +56,10 @@ def test_a_posterior_says_what_it_is_of(tmp_path, capfd):
     assert "  is_inside: yes\n" in told and told.endswith("samples: 2\n")
     found = json.loads(_told(capfd, path, "--json"))
     assert found["parameters"]["material.sliding_friction"]["interval90"] == [0.25, 0.75]
+    assert "scene" not in found
+    scene = gc.Scene.drop(0.02, count=5).to_toml()
+    path.write_text(json.dumps({**POSTERIOR, "scene_toml": scene}))
+    assert json.loads(_told(capfd, path, "--json"))["scene"]["grains"] == 5
     path.write_text(json.dumps({**POSTERIOR, "parameters": None, "samples": []}))
     assert "\nparameters: none\n" in _told(capfd, path)
 

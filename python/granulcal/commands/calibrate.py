@@ -121,7 +121,9 @@ def _run(options: argparse.Namespace) -> int:
     # What has been found is printed, whatever becomes of the file.
     lost: OSError | None = None
     try:
-        write_beside(options.out / "posterior.json", json.dumps(document, indent=1) + "\n")
+        # The file may leave its folder: it says what its numbers are of.
+        kept = {**document, "scene_toml": scene.to_toml()}
+        write_beside(options.out / "posterior.json", json.dumps(kept, indent=1) + "\n")
     except OSError as error:
         lost = error
     code = _say(options, found, document, recordings, assumed(scene.to_toml(), prior))

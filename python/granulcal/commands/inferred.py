@@ -25,6 +25,7 @@ _POSTERIOR = Table(
     {"recordings": ListOf(Text()), "parameters": Maybe(Mapping(Table(_NUMBERS, open=True)))},
     {
         "fixed": Mapping(Number()),
+        "scene_toml": Maybe(Text()),
         "inside_model": Table(
             {"is_inside": Flag()},
             {"p_value": Maybe(Number()), "impossible": ListOf(Text())},
@@ -130,6 +131,8 @@ def _of_posterior(path: Path) -> dict[str, Any]:
     known: dict[str, Any] = {"kind": "posterior"}
     names = ("recordings", "parameters", "fixed", "inside_model", "calibrated", "pours", "usable")
     known |= {name: document[name] for name in (*names, "warnings") if name in document}
+    if "scene_toml" in document:
+        known["scene"] = _of_scene(document["scene_toml"])
     parameters = document["parameters"]
     if parameters is not None:
         known["parameters"] = {
