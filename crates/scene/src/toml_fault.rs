@@ -133,9 +133,9 @@ mod tests {
     }
 
     #[test]
-    fn paths_and_priors_are_told_so_as_well() {
-        let error = Scene::funnel(0.12).with("grains", 1.5).unwrap_err().to_string();
-        assert!(error.ends_with("the number `1.5`, expected a table"), "{error}");
+    fn priors_and_paths_are_told_so_as_well() {
+        let error = Scene::funnel(0.12).with("grains.count", -3.0).unwrap_err().to_string();
+        assert!(!error.contains("usize"), "{error}");
         let text = Prior::default().to_toml().unwrap().replacen("low = 0.0", "low = \"0\"", 1);
         let Err(SceneError::PriorToml(fault)) = Prior::from_toml(&text) else { panic!("{text}") };
         assert!(fault.to_string().contains("the text \"0\", expected a number"), "{fault}");

@@ -135,8 +135,6 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
     if let Some(path) = &args.out {
         let mut document = report.document();
         document["samples"] = json!(report.samples(KEPT_DRAWS, args.seed));
-        // The file outlives the model: it says what its numbers are of.
-        document["scene_toml"] = json!(model.scene_toml);
         let text = serde_json::to_string_pretty(&document)? + "\n";
         sides.keep(write_file(path, Form::Json, text.as_bytes()).context("writing --out"));
     }

@@ -10,8 +10,8 @@ use crate::Recording;
 /// same ones. Single frames of a stereo camera at 40 cm differ by 0.12, means of five by 0.03; two pours by 0.6 to
 /// 0.8, and by 0.28 if each pixel is the mean of its square of ground.
 const SAME: f64 = 0.15;
-/// The same over what the noise of the ground alone makes of it, for a scene's grains may be larger than those that were
-/// poured: frames have 0.6 to 1.6, 40 pairs of measured mounds from 3.7 on, pours of a scene 16.
+/// The same over what the noise of the ground alone makes of it, for a scene's grains may be larger than those that
+/// were poured: frames have 0.6 to 1.6, 40 pairs of measured mounds from 3.7 on, pours of a scene 16.
 const OF_NOISE: f64 = 2.0;
 /// Median of the absolute value of a normal number of variance 1.
 const NORMAL_MEDIAN: f64 = 0.6745;
