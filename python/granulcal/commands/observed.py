@@ -159,8 +159,6 @@ def run(options: argparse.Namespace, folder: Path, document: dict[str, Any]) -> 
         print(told, file=sys.stderr)
     if options.out is not None:
         kept = {**found, "samples": _samples(posterior, _SAMPLES, seed)}
-        # The file outlives the model: it says what its numbers are of.
-        kept["scene_toml"] = document["scene_toml"]
         write_beside(options.out, json.dumps(kept, indent=1) + "\n")
     if options.plot is not None:
         title = "" if misfit.is_inside else "OUTSIDE THE MODEL: its best compromise"
