@@ -13,9 +13,20 @@ from granulcal.loop.effects.definitions import Definition
 from granulcal.loop.pours.measures import Measures
 from granulcal.pours.scene import Scene
 
-__all__ = ["Condition", "condition_of", "digest_of", "require_different"]
+__all__ = [
+    "FIT",
+    "SEALED",
+    "Condition",
+    "by_each",
+    "condition_of",
+    "digest_of",
+    "require_different",
+]
 
 Array = NDArray[np.float64]
+
+FIT, SEALED = "fit", "sealed"
+"""What a condition is for: its pours are fitted, or opened once, after the verdict."""
 
 
 @dataclass(frozen=True)
@@ -127,3 +138,10 @@ def require_different(conditions: tuple[Condition, ...]) -> None:
                     "each pour counts once"
                 )
             seen[there] = condition.name
+
+
+def by_each(
+    conditions: tuple[Condition, ...], definitions: tuple[Definition, ...]
+) -> tuple[Condition, ...]:
+    """Returns conditions by every definition; themselves where there is none."""
+    return tuple(c.under(one) for one in definitions for c in conditions) or conditions

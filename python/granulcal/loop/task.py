@@ -1,76 +1,17 @@
 """What the loop is asked: a scene, a prior, and recordings under several conditions.
 
-    scene = "scene.toml"            # paths are relative to this file
-    prior = "prior.toml"
-    effects = ["drag", "tilt.x"]    # of the library; all that a funnel's pour may lack if left out,
-                                    # ["usual", "clump"] are these and one more
-
-    [[conditions]]
-    name = "4 cm"
-    at = { "funnel.height" = 0.04 }
-    use = "fit"                     # or "sealed": opened once, after the verdict
-    recordings = ["04cm/pour-0.png", "04cm/pour-1.png"]   # a pour each
-
-`nuisances = { "tilt.x" = 0.005, "height" = 0.001 }` declares tolerances by the library's names: one
-standard deviation of each number in its unit. They are random effects of every fit and can never be
-a finding. `tolerances = "tolerances.json"` declares in which directions the statistics may be off.
-
-`camera = "camera.toml"` of a condition, or once for all, is the camera of PNGs; where it is left
-out it is looked for beside the recording. `reading = { width = 0.084 }`, likewise, are arguments of
-`Recording.observed`, or of `Recording.formation` where the scene observes nothing.
-
-`[[definitions]]` are ways to observe the same pours, thresholds and levels moved: the first is the
-one that the verdict is of, and a verdict that another overturns is none; see `definitions.py`.
-
-`[[nuisance]]` tables, written like those of a prior, are numbers of the model that nobody knows and
-that are never a finding: free numbers of the contact law, a drive's speed. Every pour of the
-archive has a value of its own, and every fit has them free.
-
-`law = ["softness"]` is short for such a table of a free number of the contact law; see `law.py`.
-
-`[resolution]` names the real grains' diameter and a coarser one to extrapolate from: see
-`resolution.py`.
-
-`averaged = true` of a condition: each recording is a mean over a time in which the grains forgot
-themselves many times (a drum's picture), so that one is enough.
-
-`session = "monday"` of conditions: what each condition has of its own (a nuisance with `shared =
-false`: a clock, a camera's tilt) is the same under all conditions of one session. What the fitted
-ones tell of it is known under the sealed ones as well; see `own_errors.py`.
-
-`between = false`: the archive has pours at the conditions alone and not between them. Numbers of a
-condition may then depend on each other (two walls that turn together). With
-`sealed_in_archive = false` as well it has none at sealed conditions: no fit needs them there, and
-all pours are where the fits are.
+`task_file.py` says how a TOML file states it.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from granulcal.documents import (
-    LARGEST_DOCUMENT,
-    Flag,
-    ListOf,
-    Mapping,
-    Number,
-    OneOf,
-    Table,
-    Text,
-    check,
-    meant,
-    parse_toml,
-    read_bytes,
-)
-from granulcal.errors import ObservationError, TrainingDataError
-from granulcal.loop.condition import Condition, condition_of, require_different
+from granulcal.documents import meant
+from granulcal.errors import ObservationError
+from granulcal.loop.condition import FIT, SEALED, Condition, by_each, require_different
 from granulcal.loop.effects.askable import (
     of_heights,
-    refuse_both,
     refuse_drawn,
     refuse_stated,
     refuse_unpourable,
@@ -79,54 +20,19 @@ from granulcal.loop.effects.askable import (
 )
 from granulcal.loop.effects.definitions import Definition, check_definitions, definition_inputs
 from granulcal.loop.effects.image_faults import require_image
-from granulcal.loop.effects.law import law_numbers
-from granulcal.loop.effects.library import FUNNEL, LIBRARY, LibraryEffect, by_name
-from granulcal.loop.effects.nuisances import declared_nuisances
-from granulcal.loop.effects.resolution import Resolution
+from granulcal.loop.effects.library import LibraryEffect
 from granulcal.loop.effects.series_faults import require_series
 from granulcal.loop.effects.tolerance import Tolerances
 from granulcal.loop.effects.untried import untried
 from granulcal.loop.pours.forward import Coarse
-from granulcal.loop.pours.measures import is_above_axis
 from granulcal.loop.recorded import doubts_of, require_no_copies
+from granulcal.loop.task_file import read_task
 from granulcal.pours.scene import Scene
 from granulcal.pours.statistics import DIAGNOSTIC_NAMES, NAMES
 from granulcal.prior import Prior
 
-__all__ = ["FIT", "SEALED", "USUAL", "Condition", "Task"]
+__all__ = ["FIT", "SEALED", "Condition", "Task"]
 
-Array = NDArray[np.float64]
-
-FIT, SEALED = "fit", "sealed"
-USUAL = "usual"
-"""Among a task's effects: all that are tried where it names none."""
-_AT = Mapping(Number())
-_READING = Mapping(OneOf((Text(), Flag(), ListOf(Number()), Number())))
-_CONDITION = Table(
-    {"name": Text(), "at": _AT, "use": Text((FIT, SEALED)), "recordings": ListOf(Text(), least=1)},
-    {"camera": Text(), "known": _AT, "reading": _READING, "averaged": Flag(), "session": Text()},
-)
-_TOLERANCE = Table({"sd": Number(0)}, {"shared": Flag()})
-_SCHEMA = Table(
-    {"scene": Text(), "prior": Text(), "conditions": ListOf(_CONDITION, least=1)},
-    {
-        "effects": ListOf(Text(), least=1),
-        "camera": Text(),
-        "nuisances": Mapping(OneOf((_TOLERANCE, Number(0)))),
-        "tolerances": Text(),
-        "reading": _READING,
-        "between": Flag(),
-        "sealed_in_archive": Flag(),
-        "definitions": ListOf(Table({"name": Text()}, {"at": _AT, "reading": _READING})),
-        # As a prior's, which checks them.
-        "nuisance": ListOf(Mapping(OneOf((Text(), Number())))),
-        "resolution": Table({"diameter": Number(0), "coarse": Number(0)}, {"scales": _AT}),
-        "law": OneOf((Flag(), ListOf(Text()))),
-    },
-)
-_ASIDE = "camera.aside"
-# What of the camera looks like an effect is asked wherever that is: it costs no pour.
-_ALIKE = {"tilt": _ASIDE, "count": "camera.missing"}
 # Fewest pours over all fit conditions from which something may be said.
 _FEWEST_POURS = 3
 
@@ -225,54 +131,7 @@ class Task:
             FileNotFoundError: a file that it names is not there.
             ObservationError: unknown or missing keys.
         """
-        file = Path(path)
-        data = read_bytes(file, most=LARGEST_DOCUMENT)
-        document = parse_toml(data, file, error=ObservationError)
-        check(document, _SCHEMA, file, error=ObservationError)
-        folder = file.parent
-        shared = {key: document[key] for key in ("camera", "reading") if key in document}
-        scene = Scene.load(folder / document["scene"])
-        conditions = tuple(
-            condition_of(file, {**shared, **table}) for table in document["conditions"]
-        )
-        definitions = tuple(Definition.of(table) for table in document.get("definitions", []))
-        named = document.get("effects", [])
-        between = document.get("between", True)
-        known = Prior.load(folder / document["prior"])
-        # What the prior fixes is known, as what the conditions state.
-        stated = [known.fixed | one.at for one in conditions]
-        library = _chosen(named, scene, stated, between, file)
-        ats = [one.at for one in _by_each(conditions, definitions)]
-        declared = _declared(document.get("nuisances", {}), scene, ats, file)
-        names = {effect.name for effect in declared}
-        if scene.observed_names:
-            # What is observed has no power of a length: such a tolerance would forgive nothing.
-            told = {*names, *named}
-            require_image(scene, (e.name for e in LIBRARY if e.camera and e.name in told))
-        candidates = tuple(effect for effect in library if effect.name not in names)
-        refuse_both(candidates, declared, named)
-        library = (*candidates, *declared)
-        if "resolution" in document:
-            library = (*library, Resolution.of(document["resolution"]).effect(scene))
-        library = _with_alike(library, scene)
-        unknown = (
-            Prior.from_tables(document["nuisance"]).parameters if "nuisance" in document else ()
-        )
-        return cls(
-            scene=scene,
-            prior=Prior(
-                [*known.parameters, *law_numbers(document.get("law", False), scene), *unknown]
-            ),
-            conditions=conditions,
-            library=library,
-            path=file,
-            tolerances=Tolerances.load(folder / document["tolerances"])
-            if "tolerances" in document
-            else None,
-            between=between,
-            sealed_in_archive=document.get("sealed_in_archive", True),
-            definitions=definitions,
-        )
+        return cls(**read_task(Path(path)))
 
     def under(self, definition: Definition, use: str) -> tuple[Condition, ...]:
         """Returns the conditions of one use, by a definition."""
@@ -406,7 +265,7 @@ class Task:
     @property
     def _by_each_definition(self) -> tuple[Condition, ...]:
         """The conditions by every definition."""
-        return _by_each(self.stated or self.conditions, self.definitions)
+        return by_each(self.stated or self.conditions, self.definitions)
 
     @property
     def _differing(self) -> list[str]:
@@ -452,90 +311,3 @@ class Task:
         differing = set(self._differing)
         shared = {p: v for p, v in self.conditions[0].at.items() if p not in differing}
         return self.scene.with_(shared) if shared else self.scene
-
-
-def _by_each(
-    conditions: tuple[Condition, ...], definitions: tuple[Definition, ...]
-) -> tuple[Condition, ...]:
-    """Conditions by every definition; themselves where there is none."""
-    return tuple(c.under(one) for one in definitions for c in conditions) or conditions
-
-
-def _default(
-    scene: Scene, ats: Sequence[dict[str, float]], between: bool
-) -> tuple[LibraryEffect, ...]:
-    """The library where a task names no effects: without those that its scene cannot show.
-
-    Nor those that are a number which its conditions, `ats`, state: what is known can be no finding;
-    nor those on a condition's number where no pour lies beside the conditions.
-    """
-    stated = ats[0]
-    beside = [path for path in stated if between and len({at.get(path) for at in ats}) > 1]
-    library = tuple(
-        effect
-        for effect in FUNNEL
-        if (effect.path in beside if effect.shift else effect.path not in stated)
-    )
-    if not _has_image(scene):
-        return tuple(effect for effect in library if not effect.image)
-    if not is_above_axis(scene):
-        # A map has any origin.
-        return tuple(effect for effect in library if effect.family != _ASIDE)
-    return library
-
-
-def _chosen(
-    named: list[str],
-    scene: Scene,
-    ats: Sequence[dict[str, float]],
-    between: bool,
-    file: Path,
-) -> tuple[LibraryEffect, ...]:
-    """The effects that a task's file names, `USUAL` being all that are tried where none is."""
-    usual = _default(scene, ats, between) if USUAL in named or not named else ()
-    others = _named([name for name in named if name != USUAL], file)
-    added = tuple(effect for effect in others if effect not in usual)
-    return (*usual, *added)
-
-
-def _named(names: list[str], file: Path) -> tuple[LibraryEffect, ...]:
-    """The entries that a task's file names."""
-    try:
-        return by_name(names)
-    except TrainingDataError as error:
-        raise TrainingDataError(f"{file}: effects: {error}") from None
-
-
-def _declared(
-    table: dict, scene: Scene, ats: list[dict[str, float]], file: Path
-) -> tuple[LibraryEffect, ...]:
-    """The tolerances that a task's file declares."""
-    try:
-        return declared_nuisances(table, scene, ats)
-    except TrainingDataError as error:
-        raise TrainingDataError(f"{file}: nuisances: {error}") from None
-
-
-def _with_alike(library: tuple[LibraryEffect, ...], scene: Scene) -> tuple[LibraryEffect, ...]:
-    """The library, with what of the camera looks like one of its candidates."""
-    if not _has_image(scene):
-        return library
-    has = {_kin(effect) for effect in library}
-    asked = {_kin(effect) for effect in library if effect.nuisance_sd is None}
-    wanted = {alike for kin, alike in _ALIKE.items() if kin in asked and alike not in has}
-    if not is_above_axis(scene):
-        wanted -= {_ASIDE}
-    return (*library, *(effect for effect in FUNNEL if _kin(effect) in wanted))
-
-
-def _kin(effect: LibraryEffect) -> str:
-    return effect.family or effect.name
-
-
-def _has_image(scene: Scene) -> bool:
-    """Whether effects of the image apply to a scene."""
-    try:
-        require_image(scene, ("camera",))
-    except ObservationError:
-        return False
-    return True
