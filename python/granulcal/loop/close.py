@@ -40,7 +40,7 @@ from granulcal.loop.check.checks import (
 from granulcal.loop.check.coverage import Coverage
 from granulcal.loop.check.learning import learning
 from granulcal.loop.check.look_again import look_again
-from granulcal.loop.check.own_errors import as_recorded
+from granulcal.loop.check.own_errors import as_recorded, has_unknown_errors
 from granulcal.loop.check.prior_rounds import ROUNDS, drawn
 from granulcal.loop.check.recentre import Recentred
 from granulcal.loop.check.standing import stand
@@ -201,6 +201,8 @@ def close_loop(
         draws=draws,
         nearer=nearer(analysis, surrogate, found, best, measured, simulated),
         error=fit,
+        sealed=sealed,
+        is_sealed_off=has_unknown_errors(task),
         size=Measures.of(task.scene).head,
         moved=elsewhere,
         trivial=trivial(analysis, surrogate, measured, recorded),

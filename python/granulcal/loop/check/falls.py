@@ -20,6 +20,7 @@ __all__ = [
     "by_draws",
     "by_error",
     "by_own_pours",
+    "by_sealed",
     "by_surrogate",
     "left_by_base",
 ]
@@ -70,6 +71,28 @@ def by_error(before: Verdict, word: Verdict, error: Improvement | None) -> Verdi
         return None
     off, base = error.total_after.square, error.total_before.square
     why = f"the base model is nearer to the data (D² {base:.3g}, {off:.3g})"
+    return _fallen("UNCONFIRMED", before, why)
+
+
+def by_sealed(
+    before: Verdict, word: Verdict, sealed: Improvement | None, *, is_off: bool = False
+) -> Verdict | None:
+    """UNCONFIRMED where the base model is nearer to what no fit has seen.
+
+    Args:
+        before: the verdict of the fits.
+        word: what is left of it.
+        sealed: from the base model to the verdict's, sealed conditions.
+        is_off: whether these have own errors that nobody knows: they are in neither model's pours,
+            and pass for the better or the worse of one.
+    """
+    if word.kind not in NAMING or sealed is None or is_off or not sealed.is_worse:
+        return None
+    off, base = sealed.total_after.square, sealed.total_before.square
+    why = (
+        "at the sealed conditions, which no fit has seen, the base model is nearer to the data "
+        f"(D² {base:.3g}, {off:.3g})"
+    )
     return _fallen("UNCONFIRMED", before, why)
 
 

@@ -32,10 +32,10 @@ from granulcal.loop.surrogate.condition_pours import ConditionPours, session_num
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
-from granulcal.loop.task import FIT, Condition, Task
+from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.loop.test.trace import Trace
 
-__all__ = ["as_recorded", "in_told_sessions", "with_own_errors"]
+__all__ = ["as_recorded", "has_unknown_errors", "in_told_sessions", "with_own_errors"]
 
 Array = NDArray[np.float64]
 
@@ -44,6 +44,15 @@ def in_told_sessions(task: Task) -> list[Condition]:
     """Returns the conditions of sessions of which one is fitted."""
     sessions = {c.session for c in task.of(FIT)} - {""}
     return [c for c in task.conditions if c.session in sessions]
+
+
+def has_unknown_errors(task: Task) -> bool:
+    """Returns whether sealed recordings may be off by declared errors that no fitted one tells."""
+    is_declared = task.tolerances is not None or any(
+        effect.nuisance_sd is not None for effect in task.library
+    )
+    told = [c.name for c in in_told_sessions(task)]
+    return is_declared and any(c.name not in told for c in task.of(SEALED))
 
 
 def as_recorded(

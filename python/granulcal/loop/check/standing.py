@@ -7,10 +7,12 @@
 | own pours | they leave nothing: p > `adequate`, for NONE > `name` | RESIDUAL, UNCONFIRMED |
 | prior | no random draw of the model is nearer to the data than its fit | UNCONFIRMED |
 | error | with a name the base model is not nearer to the data, by the 95 % | UNCONFIRMED |
+| sealed | nor to the sealed ones, unless these may have own errors nobody knows | the same |
 | distance | with a name D² is not above `LEFT` for each statistic, at 97.5 % | UNEXPLAINED |
 | definitions | the same verdict with every threshold and definition moved | OVERTURNED |
 | sealed rows | the named effect beats what needs no physics (`trivial.py`) | said beside the name |
 
+A name with which D² at the sealed conditions is no less, not for certain, has this said first.
 The base model's own pours are asked first, and the other checks are of the word that they leave.
 Surrogate and prior hold for every word, NONE as well: nothing may be said from a fit that rests
 where the surrogate is wrong. The last takes no word away, for a name may be right and yet predict
@@ -29,6 +31,7 @@ from granulcal.loop.check.falls import (
     by_draws,
     by_error,
     by_own_pours,
+    by_sealed,
     by_surrogate,
     left_by_base,
 )
@@ -63,6 +66,7 @@ class Standing:
         nearer: D^2 of the best draw less that of the fit, with 95 %; None where neither was poured.
         moved: verdicts under the other definitions.
         trivial: rows of sealed conditions that need no physics.
+        sealed: error before and after at the sealed conditions; None without any.
     """
 
     verdict: Verdict
@@ -77,6 +81,7 @@ class Standing:
     anchors: int = 0
     looked: int = 0
     weighed: tuple[ByPours, ...] = ()
+    sealed: Improvement | None = None
 
     @property
     def stands(self) -> bool:
@@ -96,6 +101,16 @@ class Standing:
         if self.before.kind not in NAMING:
             return ()
         return tuple(row.name for row in self.trivial if not row.is_beaten)
+
+    @property
+    def is_no_nearer(self) -> bool:
+        """Whether a name takes nothing of an error away at the sealed conditions.
+
+        Where there is none, none can be taken away.
+        """
+        if self.verdict.kind not in NAMING or self.sealed is None:
+            return False
+        return self.sealed.total_after.square >= self.sealed.total_before.square > 0
 
     def beside(self, model: str) -> str:
         """Returns in words which rows without physics the model does not beat, or is beaten by."""
@@ -139,6 +154,8 @@ def stand(
     draws: int = 0,
     nearer: Improvement | None = None,
     error: Improvement | None = None,
+    sealed: Improvement | None = None,
+    is_sealed_off: bool = False,
     size: int = 16,
     moved: Sequence[Moved] = (),
     trivial: Sequence[TrivialRow] = (),
@@ -158,6 +175,8 @@ def stand(
         draws: random draws that were poured.
         nearer: from the best of them (before) to the fit (after), conditions to fit.
         error: from the base model (before) to the verdict's (after), conditions to fit.
+        sealed: the same of the sealed conditions.
+        is_sealed_off: whether these have own errors that nobody knows.
         size: statistics of that error.
         moved: verdicts under other definitions.
         trivial: rows of the sealed conditions.
@@ -167,6 +186,7 @@ def stand(
     # Each may take the word away, the last has the last say.
     verdict = by_definitions(before, word, moved, rules) or word
     verdict = by_draws(before, nearer) or verdict
+    verdict = by_sealed(before, word, sealed, is_off=is_sealed_off) or verdict
     verdict = by_error(before, word, error) or verdict
     verdict = by_distance(before, word, error, size) or verdict
     verdict = by_own_pours(before, word, verdict is word, own, of_base, rules) or verdict
@@ -185,8 +205,23 @@ def stand(
         anchors=anchors,
         looked=looked,
         weighed=tuple(weighed),
+        sealed=sealed,
     )
+    reason = verdict.reason
     if verdict.kind in NAMING and found.unbeaten:
-        reason = f"{verdict.reason}; at the sealed conditions {found.beside('it')}"
-        return replace(found, verdict=replace(verdict, reason=reason))
-    return found
+        reason = f"{reason}; at the sealed conditions {found.beside('it')}"
+    if sealed is not None and found.is_no_nearer:
+        # Who reads one sentence reads the first.
+        reason = f"{_no_nearer(sealed)}; {reason}"
+    if reason == verdict.reason:
+        return found
+    return replace(found, verdict=replace(verdict, reason=reason))
+
+
+def _no_nearer(sealed: Improvement) -> str:
+    off, base = sealed.total_after.square, sealed.total_before.square
+    low, high = sealed.gain_interval
+    return (
+        f"at the sealed conditions D² is {off:.3g} with it and {base:.3g} without (95 % of what it "
+        f"takes away: {low:.3g} to {high:.3g})"
+    )

@@ -18,6 +18,7 @@ from granulcal.loop.effects.image_faults import Frame
 from granulcal.loop.effects.library import LIBRARY
 from granulcal.loop.pours.measures import Measures, formation_of
 from granulcal.loop.task import Condition
+from granulcal.loop.test.verdict import Verdict
 from granulcal.pours.formation_image import formation_figure
 from granulcal.pours.simulate import simulate
 from granulcal.report import data_uri, template
@@ -26,14 +27,22 @@ __all__ = ["sentence_of", "write_page"]
 
 _SENTENCES = {
     "NONE": "The model explains these pours: no residual was found.",
-    "RESIDUAL": "The grains do something that this model does not; what it is cannot be told.",
+    "RESIDUAL": "Something is left that this model does not do; what it is cannot be told.",
     "EFFECT": "The grains do something that this model lacks, and one effect accounts for it.",
     "SET": "The grains do something that this model lacks; several effects would account for it.",
     "EFFECTS": "The grains do something that this model lacks; it takes two effects.",
-    "UNEXPLAINED": "The grains do something that neither this model nor any effect that was tried "
-    "does.",
-    "UNCONFIRMED": "Nothing may be said: the fits rest where the surrogate of the pours is wrong.",
+    "UNEXPLAINED": "Something is left that neither this model nor any effect that was tried does.",
+    "UNCONFIRMED": "Nothing may be said: what the fits say does not stand its own checks.",
     "OVERTURNED": "Nothing may be said: the verdict depends on how the pours are observed.",
+}
+# Where some of the names are how the grains were seen, and others what they do.
+_SENTENCES_OF_BOTH = {
+    "EFFECT": "The grains do something that this model lacks, or they were seen otherwise than it "
+    "says; one effect accounts for it.",
+    "SET": "What this model leaves is how the grains were seen, or something that they do and it "
+    "lacks: which, cannot be told.",
+    "EFFECTS": "It takes two effects to account for what this model leaves: something that the "
+    "grains do, and how they were seen.",
 }
 # Share of an effect that the parameters must not mimic for its interval to hold what it says.
 _QUOTABLE = 0.5
@@ -92,18 +101,26 @@ def sentence_of(standing: Standing, seen: Sequence[Seen] = ()) -> str:
     """Returns what the verdict says, in a sentence."""
     if standing.verdict.kind == "UNEXPLAINED" and any(one.lacks for one in seen):
         return (
-            "The grains do something that neither this model nor any effect that was tried does as "
-            "far as the archive has usable pours of it."
+            "Something is left that neither this model nor any effect that was tried does as far "
+            "as the archive has usable pours of it."
         )
     if standing.verdict.kind == "NONE" and standing.surrogate_p is not None:
         return "The model explains these pours: pours of it leave no more than chance does."
-    named = [effect for effect in LIBRARY if effect.name in standing.verdict.named]
-    if named and all(effect.is_of_sight for effect in named):
+    said = _sentence_of(standing.verdict)
+    if standing.is_no_nearer:
+        return f"{said} But it predicts no better where nothing was fitted."
+    return said
+
+
+def _sentence_of(verdict: Verdict) -> str:
+    named = [effect for effect in LIBRARY if effect.name in verdict.named]
+    of_sight = [effect for effect in named if effect.is_of_sight]
+    if named and len(of_sight) == len(named):
         return (
             "Of what was tried it is not the grains: how they were seen accounts for what this "
             "model leaves."
         )
-    return _SENTENCES[standing.verdict.kind]
+    return (_SENTENCES_OF_BOTH if of_sight else _SENTENCES)[verdict.kind]
 
 
 def _errors(closed: Closed) -> list[dict[str, Any]]:

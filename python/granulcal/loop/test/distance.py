@@ -107,6 +107,7 @@ class Improvement:
             "removed": None if np.isnan(self.removed) else self.removed,
             "removed_interval": [None if np.isnan(r) else r for r in self.removed_interval],
             "is_improved": self.is_improved,
+            "is_worse": self.is_worse,
             "is_at_floor": self.is_at_floor,
         }
 
