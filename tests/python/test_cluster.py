@@ -3,6 +3,7 @@
 Ray runs in processes of the tests' own: it warns, and it leaves threads behind.
 """
 
+import importlib.util
 import re
 import shutil
 import signal
@@ -318,3 +319,67 @@ def test_a_part_on_a_cluster_has_as_many_rows_as_asked(tmp_path: Path) -> None:
     assert told.returncode in (0, 3), told.stderr[-3000:]
     assert len(list(out.glob("part-*.parquet"))) == 3
     assert gc.Dataset.load(out).scene.preset == "fast"
+
+
+def test_a_store_by_a_short_name_is_the_same_folder_on_a_worker(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Workers had made a folder named `~`, or one below where they stand."""
+    (tmp_path / "worker").mkdir()
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    for url in ("~/parts", "file://parts", "file:parts", "file://~/parts"):
+        monkeypatch.chdir(tmp_path)
+        store = PartStore(url)
+        monkeypatch.chdir(tmp_path / "worker")
+        PartStore(store.url).write(7, url.encode())
+        assert store.chunks() == {7} and store.read(7) == url.encode()
+    assert not list((tmp_path / "worker").iterdir())
+    assert PartStore("~/parts").url == str(tmp_path / "home" / "parts")
+
+
+def test_a_store_that_the_workers_do_not_share_is_told(tmp_path: Path) -> None:
+    """Only the name of a file had been told, and not what was the matter with it."""
+    scene, prior = gc.Scene.drop(0.01, count=5), gc.Prior.default()
+    batch = _native.GatheredBatch(
+        scene.native, prior.to_toml(), tmp_path / "rows", rows=4, seed=1, resume=True
+    )
+    work = {"scene": scene.native, "prior_toml": prior.to_toml(), "rows": 4, "seed": 1}
+    # As the driver sees what a worker has written to a memory of its own.
+    store = PartStore("memory://nobody-has-written-here")
+    parts = StoredParts(store, batch, tmp_path / "rows", **work)
+    url = re.escape("memory://nobody-has-written-here/part-000000.parquet")
+    with pytest.raises(FileNotFoundError, match=f"^{url} is not there.*all workers share"):
+        parts.take(0)
+    batch.close()
+
+
+def test_batches_of_one_job_have_folders_of_their_own_in_its_store(tmp_path: Path) -> None:
+    """The second batch of `close-loop --ray-store` had been refused by the parts of the first."""
+    scene, prior = gc.Scene.drop(0.01, count=25), gc.Prior.default()
+    cluster = gc.Cluster("nowhere:1", store=f"{(tmp_path / 'store').as_uri()}/")
+    (tmp_path / "store").mkdir()
+    made = {}
+    for seed in (5, 6):
+        made[seed] = gc.generate(
+            scene, prior, 20, seed=seed, out=tmp_path / f"{seed}", progress=False
+        )
+        of_batch = cluster.of_batch(scene.to_toml(), prior.to_toml(), seed).store
+        assert of_batch is not None and of_batch.startswith(f"{cluster.store}batch-")
+        stored(tmp_path / f"{seed}", Path(of_batch.removeprefix("file://")))
+    # All is in the store: no cluster is asked.
+    with spread_over(cluster):
+        for seed in (5, 6):
+            again = gc.generate(
+                scene, prior, 20, seed=seed, out=tmp_path / f"again-{seed}", progress=False
+            )
+            assert same(again, made[seed])
+    assert gc.Cluster("nowhere:1").of_batch("", "", 1) == gc.Cluster("nowhere:1")
+
+
+def test_a_store_of_a_kind_that_cannot_be_is_refused_in_its_words() -> None:
+    """It had been an error of the program's own, and an extra that does not help had been named."""
+    with pytest.raises(ValueError, match="^the store must be a folder's URL.*got 'dir://run'"):
+        PartStore("dir://run")
+    if importlib.util.find_spec("s3fs") is None:
+        with pytest.raises(ModuleNotFoundError, match="s3fs.*none of granulcal's extras.*pip inst"):
+            PartStore("s3://bucket/run")

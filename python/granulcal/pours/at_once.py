@@ -21,6 +21,7 @@ from granulcal.pours.cluster import (
     refuse_engine,
     result_of,
 )
+from granulcal.pours.losses import Losses
 
 __all__ = ["at_once"]
 
@@ -40,6 +41,7 @@ def at_once(
 
     Raises:
         ValueError: a worker of the cluster has another granulcal, or the job another engine.
+        ChildProcessError: workers of the cluster die of one of them again and again.
     """
     if cluster_in_use() is None or not each:
         yield from _on_threads(work, each, threads)
@@ -67,7 +69,7 @@ def _on_cluster(
     ray = connected()
     remote = ray.remote(num_cpus=1, max_retries=RETRIES)(_one)
     waiting, tasks = deque(range(len(each))), {}
-    shared, awaited = ray.put(work), Awaited(ray)
+    shared, awaited, losses = ray.put(work), Awaited(ray), Losses(ray)
     try:
         while waiting or tasks:
             cores = max(1, int(ray.cluster_resources().get("CPU", 1)))
@@ -78,7 +80,8 @@ def _on_cluster(
                 place = tasks.pop(reference)
                 try:
                     row = result_of(ray, reference)
-                except LostResultError:
+                except LostResultError as error:
+                    losses.count(place, error)
                     waiting.append(place)
                     continue
                 yield place, row

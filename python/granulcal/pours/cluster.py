@@ -13,12 +13,13 @@ import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from granulcal import _native
 from granulcal.pours.awaited import Awaited
+from granulcal.pours.losses import Losses
 from granulcal.pours.part_store import PartStore
 from granulcal.pours.stored_parts import StoredParts
 
@@ -69,6 +70,16 @@ class Cluster:
 
     address: str = "auto"
     store: str | None = None
+
+    def of_batch(self, scene_toml: str, prior_toml: str, seed: int) -> "Cluster":
+        """Returns the cluster with a folder in its store for one batch of a job of several.
+
+        Parts are named by their numbers alone: those of two batches would be taken for each other.
+        """
+        if self.store is None:
+            return self
+        batch = _native.hash_bytes(f"{scene_toml}\n{prior_toml}\n{seed}".encode())
+        return replace(self, store=f"{self.store.rstrip('/')}/batch-{batch}")
 
 
 _in_use: Cluster | None = None
@@ -313,7 +324,7 @@ class _Gathering:
         report: Callable[..., object] | None,
     ) -> None:
         self.ray, self.batch, self.order = ray, batch, order
-        self.awaited = Awaited(ray)
+        self.awaited, self.losses = Awaited(ray), Losses(ray)
         self.stored, self.report = stored, report
         self.remote = ray.remote(num_cpus=1, max_retries=RETRIES)(_make_part)
         self.waiting = deque(batch.missing())
@@ -356,8 +367,9 @@ class _Gathering:
         task = self.tasks.pop(reference)
         try:
             part = result_of(self.ray, reference)
-        except LostResultError:
+        except LostResultError as error:
             if task.chunk in self.batch.missing():
+                self.losses.count(task.chunk, error)
                 self.waiting.append(task.chunk)
             return
         is_new = (

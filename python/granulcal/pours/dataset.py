@@ -272,6 +272,8 @@ def generate(
     cluster = cluster_asked(ray)
     if cluster is not None:
         refuse_engine(engine)
+        if ray is None:
+            cluster = cluster.of_batch(scene.to_toml(), prior.to_toml(), seed)
     folder = Path(tempfile.mkdtemp(prefix="granulcal-") if out is None else out)
     line = ProgressLine() if progress is True else None
     report = line if line is not None else (progress if callable(progress) else None)

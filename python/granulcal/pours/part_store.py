@@ -4,7 +4,6 @@ The parts are those of a batch's data set, on their way from a worker to the fol
 which alone keeps them: no second store of pours.
 """
 
-import os
 import uuid
 from typing import Any
 
@@ -26,19 +25,28 @@ class PartStore:
 
     def __init__(self, url: str) -> None:
         import fsspec  # pyright: ignore[reportMissingImports]
+        from fsspec.implementations.local import (  # pyright: ignore[reportMissingImports]
+            LocalFileSystem,
+        )
 
         allowed = "a folder's URL as fsspec takes it, as file:///shared/run or s3://bucket/run"
         if not url:
             raise ValueError(f"the store must be {allowed}, got an empty text")
         try:
             found: tuple[Any, str] = fsspec.core.url_to_fs(url)
-        except ValueError as error:
+        except (ValueError, TypeError, AttributeError) as error:
+            # Kinds that stand on another one, such as dir://, fail as their program does.
             raise ValueError(f"the store must be {allowed}, got {url!r}: {error}") from None
         except ImportError as error:
-            raise ModuleNotFoundError(f"the store {url!r} needs another package: {error}") from None
-        # A worker need not stand where the driver does, from where a path is named.
-        self.url = url if ":" in url else os.path.abspath(url)
+            raise ModuleNotFoundError(
+                f"the store {url!r} needs another package: {error}; none of granulcal's extras has "
+                "it: pip install it for the driver and for all workers"
+            ) from None
         self._files, self._root = found[0], found[1].rstrip("/")
+        # A worker need not stand where the driver does, from where a path is named, nor be at home
+        # there: `~/run`, `run` and `file://run` would be other folders on it.
+        is_relative = isinstance(found[0], LocalFileSystem) and not url.startswith("file:///")
+        self.url = self._root if is_relative else url
 
     def chunks(self) -> set[int]:
         """Returns the numbers of the parts that are there."""

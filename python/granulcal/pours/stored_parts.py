@@ -60,10 +60,18 @@ class StoredParts:
         """Takes a part that a worker has just written; returns whether the batch lacked it.
 
         Raises:
+            FileNotFoundError: it is not there: the worker's folder of this URL is another one.
             ValueError: it is damaged, or of something else; names its URL.
         """
         try:
-            return self._batch.put(chunk, self.store.read(chunk))
+            part = self.store.read(chunk)
+        except FileNotFoundError:
+            raise FileNotFoundError(
+                f"{self.store.url_of(chunk)} is not there, but a worker has just written it: the "
+                "store must be a folder that the driver and all workers share, or an object store"
+            ) from None
+        try:
+            return self._batch.put(chunk, part)
         except ValueError as error:
             raise ValueError(self._named(chunk, error)) from None
 
