@@ -5,9 +5,9 @@ The answer comes within a minute: pours that take longer are stopped and extrapo
 
 import argparse
 import json
-import os
 from typing import TYPE_CHECKING
 
+from granulcal.cores import cores
 from granulcal.progress import duration
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def say_how_long(
         pours: those that are missing, at most.
         engine: another simulator in place of ours, or of the one in use.
     """
-    threads = getattr(options, "threads", None) or os.cpu_count() or 1
+    threads = getattr(options, "threads", None) or cores()
     each = cost(scene, prior, engine=engine)
     text = f"at most {pours} pours, {each}, {threads} at once"
     told = {"missing": pours, "threads": threads, "pour_cpu_s": each.seconds}
@@ -98,7 +98,7 @@ def say_how_long_of(
         text: follows the number of pours.
         **told: more for JSON.
     """
-    threads = getattr(options, "threads", None) or os.cpu_count() or 1
+    threads = getattr(options, "threads", None) or cores()
     # Kinds of one scene are tried once.
     first = {kind.scene.to_toml(): kind for kind in reversed(kinds)}
     costs = {toml: cost(kind.scene, kind.prior, share=len(first)) for toml, kind in first.items()}

@@ -2,13 +2,13 @@
 
 import argparse
 import json
-import os
 import sys
 from typing import TYPE_CHECKING, Any
 
 from granulcal.commands.counts import thread_count
 from granulcal.commands.dry_run import add_dry_run, say_seconds
 from granulcal.commands.numbers import at_least, probability
+from granulcal.cores import cores
 from granulcal.paths import READS
 from granulcal.progress import shown
 from granulcal.warned import warn
@@ -116,7 +116,7 @@ def _run(options: argparse.Namespace) -> int:
     from granulcal.loop.report.asked import condition_of
     from granulcal.loop.report.models import Models
 
-    models, threads = Models.load(options.loop), options.threads or os.cpu_count() or 1
+    models, threads = Models.load(options.loop), options.threads or cores()
     at, engine, model = condition_of(options.at), None, options.model or "named"
     doubts = models.doubts(model, at)
     warn(doubts)
@@ -172,7 +172,7 @@ def _of_posterior(options: argparse.Namespace) -> int:
     at, scene = condition_of(options.at), Scene.named(options.scene)
     posterior = PosteriorDraws.load(options.loop)
     engine = None if options.engine is None else engine_named(options.engine)
-    threads = options.threads or os.cpu_count() or 1
+    threads = options.threads or cores()
     scenes = poured_scenes(posterior, scene, at, options.pours)
     with shown(), pouring_with(engine):
         if options.dry_run:

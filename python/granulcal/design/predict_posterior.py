@@ -1,6 +1,5 @@
 """What an inferred material does under a condition that was not measured."""
 
-import os
 import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
@@ -8,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from granulcal.cores import cores
 from granulcal.design.posterior_file import PosteriorDraws
 from granulcal.errors import ObservationError
 from granulcal.loop.pours.forward import Forward
@@ -51,7 +51,7 @@ def predict_posterior(
     scenes = poured_scenes(posterior, scene, at, pours)
     asked = [(each, [_SEED + i]) for i, each in enumerate(scenes)]
     with tempfile.TemporaryDirectory(prefix="granulcal-") as folder:
-        forward = Forward(Path(folder), threads or os.cpu_count() or 1)
+        forward = Forward(Path(folder), threads or cores())
         forward.fill("pours", asked)
         rows = np.concatenate([forward.pours(*one) for one in asked])
     names = Measures.of(scenes[0]).names

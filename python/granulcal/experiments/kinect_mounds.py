@@ -8,7 +8,6 @@ statistics and the three of `SHAPE`.
 """
 
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.calibrate import Calibrated, calibrate
+from granulcal.cores import cores
 from granulcal.files import write_beside
 from granulcal.measured.recording import Recording
 from granulcal.pours.compare import Scale, nearest_row, standardised_distance
@@ -225,7 +225,7 @@ def study_prior() -> Prior:
 
 def _training_pours(out_dir: Path, count: int) -> Dataset:
     scene, prior = study_scene(), study_prior()
-    each, threads = pour_time([in_the_middle(scene, prior)]).seconds, os.cpu_count() or 1
+    each, threads = pour_time([in_the_middle(scene, prior)]).seconds, cores()
     print(
         f"{count} pours less those that are there: at {each:.1f} s each, {threads} at once, about "
         f"{duration(count * each / threads)} for all; then {3 * _FORWARD_SEEDS} for each map",

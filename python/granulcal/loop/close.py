@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.cores import cores
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.analysis import Analysis
@@ -136,7 +137,7 @@ def close_loop(
     # Those of NumPy cannot be registered.
     budget, seed, pairs, rounds = int(budget), int(seed), int(pairs), int(rounds)
     folder, rules = Path(out), thresholds or Thresholds()
-    workers = threads or os.cpu_count() or 1
+    workers = threads or cores()
     plan = planned(task, budget, seed, pairs, rounds, rules)
     names = Measures.of(plan.scene).names
     if archive is not None:

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from granulcal.cores import cores
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.models import Models
 from granulcal.loop.report.prediction import Prediction
@@ -43,6 +44,6 @@ def predict(
             lacks an input or that a model without physics cannot tell, or another engine.
     """
     models = Models.load(loop)
-    forward = Forward(Path(loop) / "pours", threads or os.cpu_count() or 1)
+    forward = Forward(Path(loop) / "pours", threads or cores())
     found = models.predict(model, at, forward, level=level, pours=pours)
     return replace(found, doubts=(*models.doubts(model, at), *found.doubts))

@@ -1,6 +1,5 @@
 """Pours at chosen parameters, several seeds at once."""
 
-import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
@@ -8,6 +7,7 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from granulcal.bayessim.arrays import as_matrix
+from granulcal.cores import cores
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import Pour, simulate
 from granulcal.prior import Prior
@@ -66,7 +66,7 @@ def draws_of(
 
 
 def _side_by_side(scenes: Sequence[Scene], seeds: Sequence[int], threads: int | None) -> list[Pour]:
-    workers = threads or os.cpu_count() or 1
+    workers = threads or cores()
     with ThreadPoolExecutor(min(workers, max(len(seeds), 1))) as pool:
         pours = pool.map(lambda scene, seed: simulate(scene, seed=seed), scenes, seeds)
         return [next(pours) for _ in steps("pours", seeds)]

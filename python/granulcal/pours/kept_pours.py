@@ -9,7 +9,6 @@ import contextlib
 import hashlib
 import json
 import math
-import os
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
+from granulcal.cores import cores
 from granulcal.documents import ListOf, Mapping, Maybe, Number, Table, Text, Whole, read_json
 from granulcal.engines.in_use import engine_in_use, law_of_pours
 from granulcal.files import write_beside
@@ -99,7 +99,7 @@ class KeptPours:
         engine = engine or engine_in_use()
         self.engine = engine
         self.scene, self.prior, self.path, self.seed = scene, prior, path, seed
-        self.threads, self.progress = threads or os.cpu_count() or 1, progress
+        self.threads, self.progress = threads or cores(), progress
         text = f"{scene.to_toml()}\n{prior.to_toml()}\n{seed}" + ("\nobserved" if observed else "")
         if look is not None:
             text += f"\n{', '.join(self.x_names)}"

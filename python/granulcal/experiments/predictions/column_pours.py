@@ -22,7 +22,6 @@ Every time of a pour, its substep too, is in units of the test's free fall, $1 /
 pour at 28 g is as fine and as long as one at 1 g.
 """
 
-import os
 from collections.abc import Sequence
 from math import sqrt
 from pathlib import Path
@@ -30,6 +29,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.cores import cores
 from granulcal.experiments.predictions.column_tests import Test, observing, times_of
 from granulcal.loop.pours.forward import Forward
 from granulcal.pours.scene import Scene
@@ -149,7 +149,7 @@ class ColumnPours:
 
     def __init__(self, pours: Path, model: str) -> None:
         """Begins or goes on with a folder."""
-        self._forward, self._model = Forward(pours, os.cpu_count() or 1), model
+        self._forward, self._model = Forward(pours, cores()), model
 
     def scene(self, test: Test) -> Scene:
         """Returns the test's scene, of which only `UNKNOWN` is not stated."""

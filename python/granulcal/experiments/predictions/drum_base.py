@@ -14,13 +14,13 @@ pictures and not fitted to them, each told at a speed from its own surfaces at t
 and from the pours of the other.
 """
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.cores import cores
 from granulcal.experiments.loop_drum.task import SPEEDS as PICTURED
 from granulcal.experiments.loop_drum.task import at_speed, task
 from granulcal.experiments.predictions.between_speeds import between_speeds, in_drum
@@ -63,7 +63,7 @@ class DrumBase:
     def __init__(self, data: Path, pours: Path) -> None:
         """Begins; nothing is poured yet."""
         self.scene = task(data).scene
-        self._forward = Forward(pours, os.cpu_count() or 1)
+        self._forward = Forward(pours, cores())
 
     def fill(
         self, what: str, asked: Sequence[tuple[Mapping[str, float], float, tuple[float, float]]]

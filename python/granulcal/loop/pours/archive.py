@@ -14,7 +14,6 @@ rows.
 """
 
 import json
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from granulcal import _native
+from granulcal.cores import cores
 from granulcal.documents import ListOf, Number, OneOf, Table, Text, read_json
 from granulcal.errors import TrainingDataError
 from granulcal.files import write_beside
@@ -122,7 +122,7 @@ class Archive:
                 progress=progress,
             )
         for images in self._image_rows():
-            images.fill(threads=threads or os.cpu_count() or 1, say=say)
+            images.fill(threads=threads or cores(), say=say)
 
     @property
     def missing(self) -> int:

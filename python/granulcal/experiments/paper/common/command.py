@@ -1,7 +1,6 @@
 """`granulcal reproduce paper`: which experiments, how large, where to."""
 
 import importlib
-import os
 import pkgutil
 import time
 from datetime import UTC, datetime
@@ -9,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from granulcal import _native
+from granulcal.cores import cores
 from granulcal.experiments.paper.common.experiment import Experiment
 from granulcal.experiments.paper.common.outcome import Outcome
 from granulcal.experiments.paper.common.page import write_page, write_tables
@@ -118,7 +118,7 @@ def run_one(
     """Runs an experiment, writes result.json into its folder and prints its rows."""
     if not quiet:
         print(f"{experiment.number} {experiment.name}: {experiment.asks}", flush=True)
-    shop = Workshop(folder, experiment.name, size, threads or os.cpu_count() or 1, quiet)
+    shop = Workshop(folder, experiment.name, size, threads or cores(), quiet)
     began = time.monotonic()
     quick = "" if size.is_full else f" --{size.name}"
 

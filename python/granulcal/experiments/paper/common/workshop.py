@@ -1,7 +1,6 @@
 """Where an experiment gets its pours and models: kept on disk, never made twice, and counted."""
 
 import hashlib
-import os
 import time
 import warnings
 from collections.abc import Callable, Sequence
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.arrays import read_array
+from granulcal.cores import cores
 from granulcal.engines.in_use import law_of_pours
 from granulcal.errors import NotOfPriorWarning
 from granulcal.experiments.paper.common.outcome import Outcome
@@ -87,7 +87,7 @@ class Workshop:
     folder: Path
     name: str
     size: Size
-    threads: int = field(default_factory=lambda: os.cpu_count() or 1)
+    threads: int = field(default_factory=cores)
     quiet: bool = False
     pours: int = 0
     cpu_s: float = 0.0
