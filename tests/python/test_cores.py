@@ -1,5 +1,6 @@
 """A process that may use some of a machine's cores makes no more pours at once."""
 
+import argparse
 import os
 import subprocess
 import sys
@@ -7,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
+import granulcal as gc
+from granulcal.commands.dry_run import say_how_long
 from granulcal.cores import cores
+from granulcal.pours import cluster
 
 PINNED = """
 import os, sys
@@ -36,3 +40,19 @@ def test_there_is_one_core_at_least_where_nobody_can_be_held_to_some(
     monkeypatch.delattr(os, "sched_getaffinity", raising=False)
     monkeypatch.setattr(os, "cpu_count", lambda: None)
     assert cores() == 1
+
+
+def test_a_dry_run_on_a_cluster_tells_of_its_cores(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """That of `calibrate` had told of this machine's, whether there was a cluster or not."""
+    asked = []
+    monkeypatch.setattr(cluster, "cores_of", lambda one: asked.append(one) or 64)
+    scene, prior = gc.Scene.drop(0.01, count=5), gc.Prior.default()
+    options = argparse.Namespace(ray="head:6379", threads=None)
+    assert say_how_long(options, scene, prior, 640) == 0
+    told = capsys.readouterr().out
+    assert told.rstrip().endswith("64 at once") and asked == [cluster.Cluster("head:6379")]
+    options.threads = 3
+    assert say_how_long(options, scene, prior, 640) == 0
+    assert capsys.readouterr().out.rstrip().endswith("3 at once") and len(asked) == 1

@@ -73,13 +73,14 @@ def say_how_long(
     """Pours draws of a prior and says how long `pours` of them would take; returns 0.
 
     Args:
-        options: may have `threads` and, for JSON with the words of `generate --dry-run`, `json`.
+        options: may have `threads`, `ray` and, for JSON with the words of `generate --dry-run`,
+            `json`.
         scene: what would be poured, or several.
         prior: what would be drawn.
         pours: those that are missing, at most.
         engine: another simulator in place of ours, or of the one in use.
     """
-    threads = getattr(options, "threads", None) or cores()
+    threads = _at_once(options)
     each = cost(scene, prior, engine=engine)
     text = f"at most {pours} pours, {each}, {threads} at once"
     told = {"missing": pours, "threads": threads, "pour_cpu_s": each.seconds}
@@ -93,12 +94,12 @@ def say_how_long_of(
     """Pours draws of every kind and says how long all of them would take; returns 0.
 
     Args:
-        options: may have `threads` and, for JSON, `json`.
+        options: may have `threads`, `ray` and, for JSON, `json`.
         kinds: what would be poured.
         text: follows the number of pours.
         **told: more for JSON.
     """
-    threads = getattr(options, "threads", None) or cores()
+    threads = _at_once(options)
     # Kinds of one scene are tried once.
     first = {kind.scene.to_toml(): kind for kind in reversed(kinds)}
     costs = {toml: cost(kind.scene, kind.prior, share=len(first)) for toml, kind in first.items()}
@@ -112,6 +113,17 @@ def say_how_long_of(
         for kind, one in zip(kinds, each, strict=True):
             print(f"  {kind.count} pours of {kind.name}: {one}")
     return 0
+
+
+def _at_once(options: argparse.Namespace) -> int:
+    """Returns how many pours are made at once: as many as asked, or as there are cores for them."""
+    if getattr(options, "threads", None):
+        return options.threads
+    if getattr(options, "ray", None) is None:
+        return cores()
+    from granulcal.pours.cluster import Cluster, cores_of
+
+    return cores_of(Cluster(options.ray))
 
 
 def say_seconds(options: argparse.Namespace, seconds: float, text: str, **told: object) -> int:

@@ -168,7 +168,7 @@ def _seen(
 
 def _generate(options: argparse.Namespace) -> int:
     from granulcal.engines import engine_named
-    from granulcal.pours.cluster import cores_of, refuse_engine
+    from granulcal.pours.cluster import refuse_engine
     from granulcal.pours.dataset import generate
     from granulcal.prior import Prior
     from granulcal.progress import ProgressLine
@@ -180,8 +180,6 @@ def _generate(options: argparse.Namespace) -> int:
     if cluster is not None:
         refuse_engine(engine)
     if options.dry_run:
-        if cluster is not None and options.threads is None:
-            options.threads = cores_of(cluster)
         return say_how_long(options, scene, prior, options.rows, engine=engine)
     line = None if options.quiet else ProgressLine()
     total, resumed, made = options.rows, 0, 0
