@@ -383,3 +383,39 @@ def test_a_store_of_a_kind_that_cannot_be_is_refused_in_its_words() -> None:
     if importlib.util.find_spec("s3fs") is None:
         with pytest.raises(ModuleNotFoundError, match="s3fs.*none of granulcal's extras.*pip inst"):
             PartStore("s3://bucket/run")
+
+
+def stopped_in_the_middle(scene: gc.Scene, prior: gc.Prior, folder: Path) -> list[int]:
+    """Makes the parts of a batch that was stopped; returns the rows of the first: it has gaps."""
+
+    class StopError(Exception):
+        pass
+
+    def stop(total: int, resumed: int, made: int, *left_out: int) -> None:
+        if made >= 6:
+            raise StopError
+
+    for seed in range(200):
+        shutil.rmtree(folder, ignore_errors=True)
+        with pytest.raises(StopError):
+            gc.generate(scene, prior, 32, seed=seed, out=folder, threads=8, progress=stop)
+        rows = gc.Dataset.load(folder).row.tolist() if any(folder.glob("part-*0.parquet")) else []
+        if rows != list(range(len(rows))) and rows[-1] < 16:
+            return [seed, *rows]
+    raise AssertionError("no row has overtaken another")
+
+
+def test_a_part_that_was_stopped_is_made_anew_whichever_rows_it_has(tmp_path: Path) -> None:
+    """One with gaps had ended the command, as one of something else does."""
+    scene = gc.Scene.funnel(0.12).with_({"grains.count": 40})
+    prior = gc.Prior.default()
+    seed, *rows = stopped_in_the_middle(scene, prior, tmp_path / "before")
+    store = PartStore(stored(tmp_path / "before", tmp_path / "store").as_uri())
+    batch = _native.GatheredBatch(
+        scene.native, prior.to_toml(), tmp_path / "rows", rows=16, seed=seed, resume=True
+    )
+    work = {"scene": scene.native, "prior_toml": prior.to_toml(), "rows": 16, "seed": seed}
+    assert len(rows) < 16
+    StoredParts(store, batch, tmp_path / "rows", **work).take_all()
+    assert batch.missing() == [0] and not list((tmp_path / "rows").glob("part-*"))
+    batch.close()

@@ -91,15 +91,16 @@ class StoredParts:
             raise ValueError(f"{text}; or use another store, or move this part away") from None
 
     def _is_short(self, chunk: int, data: _native.Dataset) -> bool:
-        """Returns whether a part is of this batch, as it was when it had fewer rows."""
-        first = chunk * self._batch.chunk_size
-        wanted = min(self._batch.chunk_size, self._rows - first)
+        """Returns whether a part is of this batch as it was when it was smaller, or was stopped."""
+        size = self._batch.chunk_size
+        first, wanted = chunk * size, min(size, self._rows - chunk * size)
+        numbers = [int(row) for row in data.row]
         return (
             data.scene_toml == self._scene_toml
             and Prior.from_toml(data.prior_toml) == Prior.from_toml(self._prior)
             and data.seed == self._seed
-            and data.row.tolist() == list(range(first, first + len(data)))
-            and len(data) < wanted
+            and all(first <= row < first + size for row in numbers)
+            and sum(row < self._rows for row in numbers) < wanted
         )
 
     def _named(self, chunk: int, error: ValueError) -> str:

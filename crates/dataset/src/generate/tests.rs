@@ -243,6 +243,23 @@ fn rows_that_are_there_stay_when_a_part_is_brought() {
 }
 
 #[test]
+fn a_part_that_lacks_rows_in_the_middle_is_not_whole_by_those_at_its_end() {
+    let place = Place::new();
+    place.make("whole", &GenerateOptions { chunk: 8, ..options(8) });
+    let path = place.at("whole/part-000000.parquet");
+    let table::Table { header, mut rows, .. } = table::read(&path).unwrap();
+    // Five rows, as many as are asked for, and three of those that are.
+    rows.retain(|row| ![2, 4, 6].contains(&row.row));
+    table::write(&path, &header, &rows).unwrap();
+    let five = GenerateOptions { chunk: 8, ..options(5) };
+    let mut batch =
+        GatheredBatch::open(&small(), &Prior::default(), &five, &place.at("five")).unwrap();
+    let refused = batch.put(0, &fs::read(&path).unwrap()).unwrap_err();
+    assert!(matches!(refused, DatasetError::Content { .. }), "{refused}");
+    assert_eq!(batch.missing().collect::<Vec<_>>(), [0]);
+}
+
+#[test]
 fn a_row_can_be_made_again_by_itself() {
     let place = Place::new();
     place.make("whole", &options(3));
