@@ -3,7 +3,9 @@
 Ray runs in processes of the tests' own: it warns, and it leaves threads behind.
 """
 
+import errno
 import importlib.util
+import pickle
 import re
 import shutil
 import signal
@@ -419,3 +421,26 @@ def test_a_part_that_was_stopped_is_made_anew_whichever_rows_it_has(tmp_path: Pa
     StoredParts(store, batch, tmp_path / "rows", **work).take_all()
     assert batch.missing() == [0] and not list((tmp_path / "rows").glob("part-*"))
     batch.close()
+
+
+def test_a_store_without_room_is_named_and_keeps_no_half_part(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The half ones had taken what room there was, and nothing had said where."""
+    store = PartStore((tmp_path / "store").as_uri())
+
+    def half(path: str, part: bytes) -> None:
+        Path(path).write_bytes(part[:3])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(store._files, "pipe_file", half)
+    with pytest.raises(OSError, match="cannot write: No space left") as told:
+        store.write(0, b"a part")
+    assert told.value.errno == errno.ENOSPC and told.value.filename == store.url_of(0)
+    assert not list((tmp_path / "store").iterdir())
+    # As it comes back from a worker.
+    again = pickle.loads(pickle.dumps(told.value))
+    assert (again.filename, again.strerror) == (told.value.filename, told.value.strerror)
+    monkeypatch.undo()
+    store.write(0, b"a part")
+    assert [part.name for part in (tmp_path / "store").iterdir()] == ["part-000000.parquet"]

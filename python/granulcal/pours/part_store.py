@@ -4,6 +4,8 @@ The parts are those of a batch's data set, on their way from a worker to the fol
 which alone keeps them: no second store of pours.
 """
 
+import contextlib
+import errno
 import uuid
 from typing import Any
 
@@ -63,11 +65,22 @@ class PartStore:
         return self._files.cat_file(self._path(chunk))
 
     def write(self, chunk: int, part: bytes) -> None:
-        """Writes a part beside its place and moves it there; a second one is the same."""
-        self._files.makedirs(self._root, exist_ok=True)
+        """Writes a part beside its place and moves it there; a second one is the same.
+
+        Raises:
+            OSError: it cannot be written; names its URL.
+        """
         beside = f"{self._path(chunk)}.{uuid.uuid4().hex}.tmp"
-        self._files.pipe_file(beside, part)
-        self._files.mv(beside, self._path(chunk))
+        try:
+            self._files.makedirs(self._root, exist_ok=True)
+            self._files.pipe_file(beside, part)
+            self._files.mv(beside, self._path(chunk))
+        except OSError as error:
+            # A half one would take the room of a full store, and one more with every trial.
+            with contextlib.suppress(Exception):
+                self._files.rm_file(beside)
+            url, why = self.url_of(chunk), f"cannot write: {error.strerror or error}"
+            raise OSError(error.errno or errno.EIO, why, url) from error
 
     @staticmethod
     def name_of(chunk: int) -> str:
