@@ -425,6 +425,24 @@ def test_mujocos_material_states_its_time_step(scene: gc.Scene, tmp_path: Path) 
     assert k == pytest.approx((math.pi / (20 * float(option.attrib["timestep"]))) ** 2, rel=1e-5)
 
 
+def test_mujocos_material_has_the_cones_and_the_ground_of_its_scene(
+    scene: gc.Scene, tmp_path: Path
+) -> None:
+    """Without, a grain slid aslant with 0.67 of its friction, on a plane with 2.3 times."""
+    there = gc.Scene.from_toml(f"{scene.to_toml()}\n[ground.material]\nsliding_friction = 0.1\n")
+    root = ET.parse(export_material(there, "mujoco", tmp_path)).getroot()
+    whole = ET.fromstring(ENGINES["mujoco"].mjcf(Setup.of(there)))
+    own, option = whole.find("option"), root.find("option")
+    assert own is not None and option is not None
+    for name in ("timestep", "cone", "impratio"):
+        assert option.get(name) == own.get(name) is not None
+    laid = root.find(".//default[@class='grain_ground']/geom")
+    ground = next(geom for geom in whole.iter("geom") if geom.get("name") == "ground")
+    assert laid is not None and laid.get("priority") == "1"
+    assert laid.attrib.items() <= ground.attrib.items()
+    assert "grain_ground" in (tmp_path / "material-mujoco.xml").read_text().split("-->")[0]
+
+
 def test_newton_says_where_a_mean_cannot_be_met(scene: gc.Scene, tmp_path: Path) -> None:
     smooth = gc.Scene.from_toml(f"{scene.to_toml()}\n[ground.material]\nsliding_friction = 0.1\n")
     told = "ground: sliding_friction is half of the grains' own"

@@ -21,6 +21,8 @@ NOTES = (
     "tangential_restitution has no counterpart: friction in MuJoCo never gives back",
     "a pair takes the larger friction and the smaller restitution of its two geoms, or those of the higher priority, "
     "which ground and walls have in a scene that are smoother than the grains or bounce more",
+    "a geom of which nothing is said has MuJoCo's own friction of 1, which counts then: what lies below the grains is to "
+    'have class="grain_ground"',
     "friction is regularised: a heap creeps by impratio, which is 10 here",
     "round walls are rings of 24 boxes: MuJoCo's meshes are convex",
     "walls are 4 mm thick: outside a box or a round wall, grains touch it 4 mm farther out",
@@ -31,6 +33,8 @@ UNEQUAL = (
 )
 """What of a material is not each grain's own where they differ in size."""
 _DT = 1e-4
+# Pyramidal cones, MuJoCo's own, let grains slide aslant with two thirds of the friction.
+_CONE = 'cone="elliptic" impratio="10"'
 # Time of an impact over the time step: fewer steps would not resolve the dashpot.
 _STEPS = 20
 _SIDES = 24
@@ -66,11 +70,15 @@ def _words(of: Contact, setup: Setup) -> str:
 
 
 def material(setup: Setup, young: float | None = None) -> str:
-    """Returns time step and defaults of the grains' geoms as MJCF to include: `solref` is of that step."""
+    """Returns options and defaults of the grains' and the ground's geoms as MJCF to include.
+
+    `solref` is of that time step, and friction of these cones.
+    """
     del young
+    ground = f'<default class="grain_ground"><geom {_words(setup.ground, setup)}/></default>'
     return (
-        f'<mujocoinclude>\n  <option timestep="{_DT:g}"/>\n'
-        f"  <default>{_grain(setup)}</default>\n</mujocoinclude>\n"
+        f'<mujocoinclude>\n  <option timestep="{_DT:g}" {_CONE}/>\n'
+        f"  <default>\n    {_grain(setup)}\n    {ground}\n  </default>\n</mujocoinclude>\n"
     )
 
 
@@ -102,7 +110,7 @@ def mjcf(setup: Setup) -> str:
         [
             f"<!-- {signed(setup.name, ENGINE)} -->",
             f'<mujoco model="{setup.name}">',
-            f'  <option timestep="{_DT:g}" gravity="{gravity}" cone="elliptic" impratio="10" '
+            f'  <option timestep="{_DT:g}" gravity="{gravity}" {_CONE} '
             'integrator="implicitfast" solver="Newton" iterations="20" jacobian="sparse"/>',
             '  <size memory="512M"/>',
             f"  <default>{_grain(setup)}</default>",
