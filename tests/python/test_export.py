@@ -443,6 +443,26 @@ def test_mujocos_material_has_the_cones_and_the_ground_of_its_scene(
     assert "grain_ground" in (tmp_path / "material-mujoco.xml").read_text().split("-->")[0]
 
 
+@pytest.mark.parametrize("engine", ["newton", "chrono"])
+def test_a_material_has_the_ground_without_which_the_grains_is_another(
+    scene: gc.Scene, engine: str
+) -> None:
+    """Both combine two shapes, and what nothing is said of has numbers of its own."""
+    there = Setup.of(
+        gc.Scene.from_toml(f"{scene.to_toml()}\n[ground.material]\nsliding_friction = 0.3\n")
+    )
+    material = ENGINES[engine].material(there)
+    assert material in ENGINES[engine].scene(there)["pour.py"]
+    ground = material[material.index("ground = ") :]
+    told = {"newton": ("mu=0.2,", "mu_rolling="), "chrono": ("SetFriction(0.3)", "SetRolling")}
+    assert all(word in ground for word in told[engine])
+
+
+def test_newton_is_said_to_need_restitution_switched_on(scene: gc.Scene, tmp_path: Path) -> None:
+    head = export_material(scene, "newton", tmp_path).read_text().split("grain = ")[0]
+    assert "enable_restitution=True" in head
+
+
 def test_newton_says_where_a_mean_cannot_be_met(scene: gc.Scene, tmp_path: Path) -> None:
     smooth = gc.Scene.from_toml(f"{scene.to_toml()}\n[ground.material]\nsliding_friction = 0.1\n")
     told = "ground: sliding_friction is half of the grains' own"

@@ -14,6 +14,8 @@ ENGINE = "chrono"
 NOTES = (
     "rolling and torsional friction at walls are half of ours: of two materials Chrono takes the smaller",
     "friction and restitution of two materials: the smaller, so a wall rougher than the grains is as smooth",
+    "a material of which nothing is said has no rolling friction, and the smaller counts: what lies below the grains is "
+    "to have the material `ground`",
     "tangential_restitution has no counterpart",
     "round walls are meshes of 64 sides",
 )
@@ -54,9 +56,10 @@ def _skins(setup: Setup) -> list[str]:
 
 
 def material(setup: Setup, young: float | None = None) -> str:
-    """Returns the lines of a material."""
+    """Returns the lines of a material: the grains', and the ground's."""
     del young
-    return _lines("grain", setup.grains, setup.effective_radius)
+    grain = _lines("grain", setup.grains, setup.effective_radius)
+    return grain + _lines("ground", setup.ground, setup.smallest)
 
 
 def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
@@ -73,7 +76,7 @@ import json
 import pychrono as chrono
 
 table = json.load(open("pour.json"))
-{material(setup)}{_lines("ground", setup.ground, setup.smallest)}{laws}
+{material(setup)}{laws}
 system = chrono.ChSystemNSC()
 system.SetCollisionSystemType(chrono.ChCollisionSystem.Type_BULLET)
 system.SetGravitationalAcceleration(chrono.ChVector3d{setup.gravity})

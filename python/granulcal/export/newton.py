@@ -14,6 +14,9 @@ __all__ = ["ENGINE", "NOTES", "UNEQUAL", "material", "notes", "scene"]
 ENGINE = "newton"
 NOTES = (
     "XPBD solves by a few sweeps: friction and restitution are approached, not met",
+    "the solver by itself lets nothing bounce: SolverXPBD(model, enable_restitution=True)",
+    "of two shapes the mean counts: what lies below the grains is to have the config `ground`, for that of which nothing "
+    "is said has a friction of 1",
     "tangential_restitution has no counterpart",
     "round walls are meshes of 64 sides",
 )
@@ -67,16 +70,17 @@ def _lengths(of: Contact, lever: float) -> dict[str, float]:
 
 
 def material(setup: Setup, young: float | None = None) -> str:
-    """Returns the lines of a material."""
+    """Returns the lines of a material: the grains', and the ground's that makes the mean right."""
     del young
-    return _config("grain", setup.grains, setup.effective_radius, setup.density, None, 0.0)
+    own = setup.effective_radius
+    grain = _config("grain", setup.grains, own, setup.density, None, 0.0)
+    return grain + _config("ground", setup.ground, setup.smallest, 0.0, setup.grains, own)
 
 
 def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
     """Returns the files of a pour: `python pour.py` leaves grains.csv."""
     own, wide = setup.effective_radius, setup.smallest
-    laws = _config("ground", setup.ground, wide, 0.0, setup.grains, own)
-    laws += "".join(
+    laws = "".join(
         _config(f"wall_{i}", body.law, wide, 0.0, setup.grains, own)
         for i, body in enumerate(setup.walls)
     )
