@@ -5,6 +5,7 @@ import pickle
 import re
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -215,6 +216,51 @@ def test_pair_plot_is_written(tmp_path):
     assert figure.axes[2].get_yscale() == "log"
     with pytest.raises(ValueError, match="truth must have shape"):
         posterior.pair_plot(truth=[0.0])
+
+
+def _drawn(path, names, **marks):
+    """The figure of a posterior of numbers from 0 to 1, drawn, and where its texts end [px]."""
+    parameters = [Parameter(path=n, distribution="uniform", low=0.0, high=1.0) for n in names]
+    mixture = Mixture.from_covariances(
+        np.ones(1), np.zeros((1, len(names))), np.eye(len(names))[None]
+    )
+    figure: Any = Posterior.from_mixture(Prior(parameters), mixture).pair_plot(path, **marks)
+    figure.canvas.draw()
+    found = [text for text in (figure._suptitle, figure._supxlabel) if text is not None]
+    return figure, [text.get_window_extent() for text in found], figure._supxlabel.get_text()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_pair_plot_says_what_it_shows_in_its_own_width(tmp_path, count):
+    """The title of one parameter was cut off at both sides, and nothing said what is shaded."""
+    names = [f"material.{letter}" for letter in "abc"[:count]]
+    title = "OUTSIDE THE MODEL: its best compromise"
+    figure, boxes, told = _drawn(tmp_path / "a.png", names, title=title, truth=[0.5] * count)
+    width = figure.bbox.width
+    assert len(boxes) == 2 and all(box.x0 >= 0 and box.x1 <= width for box in boxes)
+    said = " ".join(told.split())
+    assert "mode" in said and "Red: the truth" in said and "SI units" in said
+    assert ("50 % and 90 %" in said) == (count > 1)
+
+
+def test_a_pair_plot_names_whose_number_an_axis_has(tmp_path):
+    names = ["material.sliding_friction", "funnel.height", "effects.tilt.x"]
+    figure, _, _ = _drawn(tmp_path / "a.png", names)
+    labels = {axis.get_xlabel() for axis in figure.axes} - {""}
+    assert labels == {"sliding friction", "funnel height", "tilt x"}
+
+
+def test_a_truth_at_the_priors_edge_is_marked_whole_and_one_beyond_it_is_told(tmp_path):
+    """At a corner a quarter of the cross was left, and of a truth beyond the axes nothing."""
+    names = ["material.a", "material.b"]
+    figure, _, told = _drawn(tmp_path / "a.png", names, truth=[1.0, 0.0])
+    crosses = [line for line in figure.axes[2].lines if line.get_marker() == "x"]
+    assert len(crosses) == 1 and not crosses[0].get_clip_on() and "beyond" not in told
+    shaded = [each.get_paths()[0].get_extents() for each in figure.axes[2].collections]
+    assert any(box.x0 == 0.0 and box.x1 == 1.0 for box in shaded)
+    figure, _, told = _drawn(tmp_path / "b.png", names, truth=[1.5, 0.5])
+    assert not [line for line in figure.axes[2].lines if line.get_marker() == "x"]
+    assert "The truth lies beyond the axis of a." in " ".join(told.split())
 
 
 def test_a_posterior_says_what_it_is_and_stays_in_its_process():

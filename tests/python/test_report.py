@@ -11,6 +11,8 @@ import granulcal as gc
 from granulcal.bayessim.check.identifiability import NO_TRACE, Identifiability
 from granulcal.bayessim.check.misfit import Misfit, StatisticMisfit
 from granulcal.bayessim.check.toys import LinearGaussian
+from granulcal.bayessim.network.mixture import Mixture
+from granulcal.parameter import Parameter
 from granulcal.pours.formation_image import common_field, height_grid
 from granulcal.pours.profile_picture import profile_band, radial_profile
 from granulcal.report import HealthRow, write_report
@@ -102,6 +104,30 @@ def test_the_page_shows_every_number(page, small_data):
     assert f"assumed: grains.count {small_data.scene.get('grains.count'):g}, " in text
     assert "Not checked" in text
     assert gc.__version__ in text
+
+
+@pytest.mark.parametrize(("count", "kind"), [(3, "narrow"), (7, "wide")])
+def test_many_parameters_have_a_picture_that_can_be_read(
+    small_data: gc.Dataset, small_pour: gc.Pour, tmp_path: Path, count: int, kind: str
+) -> None:
+    """Pressed into the page's width, letters of seven parameters were four pixels high."""
+    free = [
+        Parameter(path=f"material.{letter}", distribution="uniform", low=0.0, high=1.0)
+        for letter in "abcdefg"[:count]
+    ]
+    mixture = Mixture.from_covariances(np.ones(1), np.zeros((1, count)), np.eye(count)[None])
+    page = write_report(
+        tmp_path / "report.html",
+        observed=small_pour.statistics().paper16,
+        posterior=gc.Posterior.from_mixture(gc.Prior(free), mixture),
+        pours=[small_pour],
+        data=small_data,
+        title="of many",
+        summary="",
+    )
+    figure = page.read_text(encoding="utf-8").split("<figure")[-1].split("src=")[0]
+    assert f'class="{kind}"' in figure
+    assert ("style=" in figure) == (f"width: {11 * count}rem" in figure) == (count > 4)
 
 
 def test_large_differences_are_marked(page):

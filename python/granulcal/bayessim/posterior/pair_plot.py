@@ -1,5 +1,6 @@
 """Figure of a posterior: marginals on the diagonal, pairs below it."""
 
+import textwrap
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -27,6 +28,9 @@ _BINS = 50
 _SMOOTHING = 1.5
 _DRAWS = 20_000
 _PANEL_INCHES = 2.3
+# Sizes of what stands over and below the figure, and how wide a letter is over its size [-].
+_TITLE, _CAPTION, _LETTER = 10, 8, 0.6
+_POINTS_PER_INCH = 72
 
 
 class Drawn(Protocol):
@@ -63,7 +67,7 @@ def pair_plot(
     """Returns the figure; axes span the prior's bounds, log parameters have log axes.
 
     Contours hold 50 % and 90 % of the draws; a white-edged dot marks the mode, a red cross and
-    lines the truth.
+    lines the truth, as the figure says below itself.
 
     Args:
         posterior: what to draw.
@@ -90,22 +94,59 @@ def pair_plot(
     figure = Figure(figsize=(side, side), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(count, count, squeeze=False)
-    labels = [
-        name.replace("_", " ") for name in short_names([p.path for p in posterior.prior.free])
-    ]
+    labels = _labels([p.path for p in posterior.prior.free])
     for row in range(count):
         for column in range(count):
             _frame(axes[row][column], posterior, labels, row, column)
     shown = [(posterior, _COLOUR)] + ([(extra, _EXTRA_COLOUR)] if extra is not None else [])
     for each, colour in shown:
         _draw(axes, each, colour)
+    unseen: list[str] = []
     if true_values is not None:
-        _mark_truth(axes, true_values)
+        ends = [_limits(posterior, i) for i in range(count)]
+        is_shown = [
+            low <= value <= high for value, (low, high) in zip(true_values, ends, strict=True)
+        ]
+        _mark_truth(axes, true_values, is_shown)
+        unseen = [label for label, shows in zip(labels, is_shown, strict=True) if not shows]
     if title:
-        figure.suptitle(title, fontsize=10)
+        figure.suptitle(_wrapped(title, side, _TITLE), fontsize=_TITLE)
+    told = _caption(count, has_truth=true_values is not None, has_extra=extra is not None)
+    if unseen:
+        told += f" The truth lies beyond the axis of {', '.join(unseen)}."
+    figure.supxlabel(_wrapped(told, side, _CAPTION), fontsize=_CAPTION)
     if path is not None:
         save_figure(figure, path, dpi=160)
     return figure
+
+
+def _labels(paths: list[str]) -> list[str]:
+    """Names of the axes; beside a material's the word before says whose height or x it is."""
+    found = []
+    for path, name in zip(paths, short_names(paths), strict=True):
+        parts = path.split(".")
+        is_bare = "." not in name and len(parts) > 1 and parts[0] != "material"
+        found.append((f"{parts[-2]} {name}" if is_bare else name).replace("_", " "))
+    return found
+
+
+def _caption(count: int, *, has_truth: bool, has_extra: bool) -> str:
+    """What the marks of a figure of so many parameters are."""
+    regions = (
+        "Shaded: 50 % and 90 % of the posterior. Dot and dotted line: its mode, of all together."
+    )
+    told = regions if count > 1 else "Dotted: the mode."
+    if has_truth:
+        told += " Red: the truth."
+    if has_extra:
+        told += " Orange: the other posterior."
+    return f"{told} SI units."
+
+
+def _wrapped(text: str, inches: float, size: float) -> str:
+    """Breaks a text into lines that the figure's width holds."""
+    letters = int(inches * _POINTS_PER_INCH / (_LETTER * size))
+    return textwrap.fill(text, max(letters, 1))
 
 
 def _frame(axis: Any, posterior: Drawn, labels: list[str], row: int, column: int) -> None:
@@ -170,12 +211,19 @@ def _contours(
     order = np.sort(smooth.ravel())[::-1]
     held = np.cumsum(order) / order.sum()
     thresholds = [order[np.searchsorted(held, level)] for level in _LEVELS]
-    x = parameters[column].from_coordinate(0.5 * (x_edges[1:] + x_edges[:-1]))
-    y = parameters[row].from_coordinate(0.5 * (y_edges[1:] + y_edges[:-1]))
+    x = parameters[column].from_coordinate(_middles(x_edges))
+    y = parameters[row].from_coordinate(_middles(y_edges))
+    # As far as the bounds, where many truths lie, and not half a bin short of them.
+    smooth = np.pad(smooth, 1, mode="edge")
     for low, alpha in zip(thresholds, (0.25, 0.45), strict=True):
         top = max(smooth.max(), low) * 1.0001
         axis.contourf(x, y, smooth.T, levels=[low, top], colors=[colour], alpha=alpha)
     axis.contour(x, y, smooth.T, levels=sorted(set(thresholds)), colors=[colour], linewidths=0.8)
+
+
+def _middles(edges: Array) -> Array:
+    """Middles of bins, between the two ends of all."""
+    return np.concatenate([edges[:1], 0.5 * (edges[1:] + edges[:-1]), edges[-1:]])
 
 
 def _smoothed(counts: Array) -> Array:
@@ -190,12 +238,21 @@ def _smoothed(counts: Array) -> Array:
     return counts
 
 
-def _mark_truth(axes: Any, truth: Array) -> None:
+def _mark_truth(axes: Any, truth: Array, is_shown: list[bool]) -> None:
+    """Marks the truth where the axes reach it; at their ends, too, whole."""
     for row in range(len(truth)):
-        axes[row][row].axvline(truth[row], color=_TRUTH_COLOUR, linewidth=1.2)
+        if not is_shown[row]:
+            continue
+        axes[row][row].axvline(truth[row], color=_TRUTH_COLOUR, linewidth=1.2, clip_on=False)
         for column in range(row):
-            axis = axes[row][column]
-            axis.plot(truth[column], truth[row], "x", color=_TRUTH_COLOUR, markersize=8)
+            if is_shown[column]:
+                axes[row][column].plot(
+                    *(truth[column], truth[row], "x"),
+                    color=_TRUTH_COLOUR,
+                    markersize=8,
+                    clip_on=False,
+                    zorder=5,
+                )
 
 
 def _limits(posterior: Drawn, i: int) -> tuple[float, float]:
