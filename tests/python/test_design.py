@@ -266,6 +266,29 @@ def test_a_model_of_another_material_is_not_taken_for_ones_own(tmp_path):
     assert _is_trained(tmp_path, one) and not _is_trained(tmp_path, two)
 
 
+def test_a_plans_picture_tells_of_grains_beyond_it(line: RingModel, monkeypatch, tmp_path) -> None:
+    """Of 150 grains 45 lay outside, and the histogram said nothing of them."""
+    from granulcal.design import picture
+
+    plan = gc.design_rings(line, [gc.Ring(outer=0.06)])
+    kept = []
+    monkeypatch.setattr(picture, "save_figure", lambda figure, *_, **__: kept.append(figure))
+    reach = np.linspace(0.0, 0.15, 30)
+    positions = np.column_stack([reach, np.zeros(30), np.full(30, 2e-3)])
+    pattern = Pattern(
+        positions=positions,
+        radii=np.full(30, 2e-3),
+        pour=np.zeros(30, int),
+        statuses=("at_rest",),
+        rings=np.zeros((1, 2)),
+        scene=line.scene,
+    )
+    picture.plan_picture(plan, pattern, tmp_path / "plan.png")
+    labels = [text.get_text() for text in kept[0].axes[1].get_legend().get_texts()]
+    beyond = int((reach > 3.2 * 0.06 / 2).sum())
+    assert labels[0].endswith(f"; {beyond} of 30 grains farther out")
+
+
 def test_command_trains_plans_and_resumes(tmp_path):
     out = tmp_path / "plan"
     words = ["rings", "funnel", "--set", "grains.count=60", "--heights", "0.05", "0.13"]

@@ -55,6 +55,26 @@ def test_curve_of_a_known_binomial_is_found():
         assert inside.mean() > 0.8
 
 
+def test_seven_numbers_of_grains_are_seven_lines(monkeypatch, tmp_path):
+    """The seventh had the colour of the first, and the legend lay over the curves."""
+    from granulcal.design import forecast as drawn
+
+    kept: list[Any] = []
+    monkeypatch.setattr(drawn, "save_figure", lambda figure, *_, **__: kept.append(figure))
+    heights = np.linspace(0.05, 0.3, 40)
+    counts = np.round(200 * heights)
+    found = forecast_of(heights, np.empty((40, 0)), counts, 500, grains=range(1, 8))
+    found.plot(tmp_path / "spill.png")
+    figure = kept[0]
+    figure.canvas.draw()
+    chances = figure.axes[1]
+    looks = {(line.get_color(), line.get_linestyle()) for line in chances.lines}
+    assert len(looks) == len(chances.lines) == 7
+    legend = figure.legends[0].get_window_extent()
+    assert not chances.get_window_extent().overlaps(legend)
+    assert legend.x1 <= figure.bbox.width
+
+
 def test_more_spread_than_chance_is_seen():
     generator = np.random.default_rng(2)
     heights, rho = generator.uniform(0.05, 0.3, 300), 0.01

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
+from granulcal.design.lines import line_of
 from granulcal.files import save_figure, write_beside
 from granulcal.pours.left_out import LeftOut
 
@@ -21,7 +22,6 @@ Array = NDArray[np.float64]
 _CM = 1e2
 # What is nearer to the lowest height than this share of the range may be advised by chance.
 _NEAR = 0.1
-_COLOURS = ("#1f5f8b", "#c8742b", "#4a8c4a", "#8b4a8b", "#8b1f3d", "#5b5b5b")
 _ROWS = 9
 
 
@@ -134,12 +134,17 @@ class SpillForecast:
         counts.set(xlabel="height of the funnel [cm]", ylabel=f"spilled grains of {self.total}")
         counts.legend()
         for i, k in enumerate(self.grains):
-            colour = _COLOURS[i % len(_COLOURS)]
-            heights = _CM * self.heights
+            colour, style = line_of(i)
+            heights, curve = _CM * self.heights, self.probability[i]
             chances.fill_between(heights, self.low[i], self.high[i], color=colour, alpha=0.25)
-            chances.plot(heights, self.probability[i], color=colour, label=f"at least {k}")
+            chances.plot(heights, curve, color=colour, linestyle=style, label=f"at least {k}")
         chances.set(xlabel="height of the funnel [cm]", ylabel="probability", ylim=(-0.02, 1.02))
-        chances.legend(title="spilled grains; 90 % band")
+        # Beside the curves, which may be anywhere between 0 and 1.
+        figure.legend(
+            *chances.get_legend_handles_labels(),
+            loc="outside right center",
+            title="spilled grains;\n90 % band",
+        )
         save_figure(figure, path, dpi=90)
 
     def __str__(self) -> str:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from granulcal.design.lines import colour_of
 from granulcal.design.pattern import Pattern
 from granulcal.design.plan import Plan
 from granulcal.files import save_figure
@@ -14,7 +15,6 @@ __all__ = ["plan_picture"]
 
 _PIXELS = 500
 _CAMERA_HEIGHT = 1.0
-_COLOURS = ("#1f5f8b", "#c8742b", "#4a8c4a", "#8b4a8b", "#8b1f3d", "#5b5b5b")
 _CM, _MM = 1e2, 1e3
 _TURN = np.linspace(0, 2 * np.pi, 361)
 
@@ -57,7 +57,7 @@ def _draw_heights(axis: Any, plan: Plan, pattern: Pattern, field: float, figure:
     )
     axis.set_facecolor("#20262b")
     for p in plan.pours:
-        colour = _COLOURS[(p.order - 1) % len(_COLOURS)]
+        colour = colour_of(p.order - 1)
         for radius, style in ((p.wanted_inner, ":"), (p.wanted_outer, "--")):
             if radius is not None:
                 x, y = _CM * radius * np.cos(_TURN), _CM * radius * np.sin(_TURN)
@@ -72,13 +72,16 @@ def _draw_distances(axis: Any, plan: Plan, pattern: Pattern, field: float) -> No
     distance = _CM * np.hypot(pattern.positions[:, 0], pattern.positions[:, 1])
     bins = np.linspace(0, _CM * field / 2, 81)
     for i, p in enumerate(plan.pours):
-        colour = _COLOURS[i % len(_COLOURS)]
+        colour, own = colour_of(i), distance[pattern.pour == i]
         label = f"pour {p.order} from {_CM * p.height:.1f} cm"
         label += " (extrapolated)" if p.is_extrapolated else ""
-        axis.hist(distance[pattern.pour == i], bins, color=colour, alpha=0.55, label=label)
+        if farther := int((own > bins[-1]).sum()):
+            label += f"; {farther} of {len(own)} grains farther out"
+        axis.hist(own, bins, color=colour, alpha=0.55, label=label)
         if p.wanted_inner is not None:
             axis.axvline(_CM * p.wanted_inner, color=colour, linestyle=":")
         axis.axvline(_CM * p.wanted_outer, color=colour, linestyle="--")
     axis.set(xlabel="distance from the axis [cm]", ylabel="grains")
     axis.set_title("dotted: wanted inner radius, dashed: outer")
-    axis.legend()
+    # Below the axes: the bars may be high anywhere.
+    axis.legend(loc="upper left", bbox_to_anchor=(0, -0.12), frameon=False)
