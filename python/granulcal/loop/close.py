@@ -28,6 +28,7 @@ from granulcal.loop.check.alarms import (
     of_labels,
     of_left,
     of_placebo,
+    of_prior,
     of_rows,
     of_untried,
 )
@@ -44,6 +45,7 @@ from granulcal.loop.check.look_again import look_again
 from granulcal.loop.check.own_errors import as_recorded, has_unknown_errors
 from granulcal.loop.check.prior_rounds import ROUNDS, drawn
 from granulcal.loop.check.recentre import Recentred
+from granulcal.loop.check.scatter import of_scatter, scatter_of
 from granulcal.loop.check.standing import stand
 from granulcal.loop.check.steady import drifts
 from granulcal.loop.check.unseen import seen_of, told_unseen
@@ -222,6 +224,11 @@ def close_loop(
     alarms += of_rows(standing) + told_unseen(poured)
     alarms += of_ends(verdict, found.best, task) + of_untried(verdict, task.untried)
     alarms += of_base_fit(verdict, settled.at_base, rules)
+    alarms += of_prior(verdict, found.base, task)
+    # A mean over time is steadier than a pour.
+    single = [o for c, o in zip(analysis.fitted, observed, strict=True) if not c.averaged]
+    at_fit = found.fit_of(found.best)
+    alarms += of_scatter(scatter_of(surrogate, at_fit, single, seed=seed), rules)
     if fit.total_before.interval[0] > 0:
         fitted = {c.name: measured[c.name] for c in analysis.fitted}
         spread = surrogate.raw_spread[: Measures.of(task.scene).head]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from granulcal.loop.check.standing import Standing
 from granulcal.loop.effects.library import LIBRARY, LibraryEffect
+from granulcal.loop.pours.cube import from_cube
 from granulcal.loop.pours.replicates import FEWEST
 from granulcal.loop.task import Task
 from granulcal.loop.test.distance import Improvement, noise_free_square
@@ -22,6 +23,7 @@ __all__ = [
     "of_labels",
     "of_left",
     "of_placebo",
+    "of_prior",
     "of_rows",
     "of_untried",
 ]
@@ -31,6 +33,8 @@ Array = NDArray[np.float64]
 
 # A strength whose best fit is so near to the end of its range leans on it.
 _AT_END = 0.02
+# Share of a parameter's prior beyond a base fit, on one side, from which it lies at its end.
+_BEYOND = 0.01
 # Share of D² that must be left once conditions are exchanged for it to be said.
 _EXCHANGED = 0.5
 
@@ -110,6 +114,29 @@ def of_ends(verdict: Verdict, best: Explanation, task: Task) -> tuple[str, ...]:
             "one may lie beyond, and its interval cannot say so"
         )
     return tuple(found)
+
+
+def of_prior(verdict: Verdict, base: Explanation, task: Task) -> tuple[str, ...]:
+    """Returns which parameters of the base model's fit lie at an end of their prior.
+
+    A prior that ends before the truth leaves something as a missing effect does, and an effect that
+    does nearly the same takes its place.
+    """
+    if verdict.kind == "NONE":
+        return ()
+    found = from_cube(task.prior, base.theta[None])[0].tolist()
+    at = [
+        f"{name} = {value:.3g}"
+        for name, u, value in zip(task.prior.names, base.theta.tolist(), found, strict=True)
+        if not _BEYOND < u < 1 - _BEYOND
+    ]
+    if not at:
+        return ()
+    return (
+        f"the base model's fit lies at an end of its prior, {', '.join(at)}: either what is left "
+        "has bent it there, or the true one lies beyond, and what is left is that; ask again with "
+        "a wider prior, where the scene takes one",
+    )
 
 
 def of_labels(
