@@ -106,11 +106,14 @@ def test_the_page_shows_every_number(page, small_data):
     assert gc.__version__ in text
 
 
-@pytest.mark.parametrize(("count", "kind"), [(3, "narrow"), (7, "wide")])
-def test_many_parameters_have_a_picture_that_can_be_read(
+@pytest.mark.parametrize(("count", "kind"), [(1, "narrow"), (3, "narrow"), (7, "wide")])
+def test_pictures_of_one_and_of_many_parameters_can_be_read(
     small_data: gc.Dataset, small_pour: gc.Pour, tmp_path: Path, count: int, kind: str
 ) -> None:
-    """Pressed into the page's width, letters of seven parameters were four pixels high."""
+    """Pressed into the page's width, letters of seven parameters were four pixels high.
+
+    Of one parameter there are neither contours nor a dot.
+    """
     free = [
         Parameter(path=f"material.{letter}", distribution="uniform", low=0.0, high=1.0)
         for letter in "abcdefg"[:count]
@@ -125,7 +128,10 @@ def test_many_parameters_have_a_picture_that_can_be_read(
         title="of many",
         summary="",
     )
-    figure = page.read_text(encoding="utf-8").split("<figure")[-1].split("src=")[0]
+    text = page.read_text(encoding="utf-8")
+    figure = text.split("<figure")[-1].split("src=")[0]
+    caption = text.split("<figcaption")[-1]
+    assert ("Contours" in caption) == ("dot and" in caption) == (count > 1)
     assert f'class="{kind}"' in figure
     assert ("style=" in figure) == (f"width: {11 * count}rem" in figure) == (count > 4)
 

@@ -11,6 +11,7 @@ from granulcal.bayessim import BayesSim
 from granulcal.bayessim.check.toys import PileStandIn
 from granulcal.bayessim.network.trainer import train
 from granulcal.bayessim.training.config import Config
+from granulcal.bayessim.training.summary import TrainingSummary
 
 
 def test_many_pairs_take_fewer_passes_and_less_jitter():
@@ -60,3 +61,26 @@ def test_a_chosen_number_of_components_is_in_the_model(tmp_path):
     np.testing.assert_array_equal(
         loaded.posterior(x[0]).log_prob(theta), model.posterior(x[0]).log_prob(theta)
     )
+
+
+def test_the_picture_of_a_training_has_the_pass_that_was_kept_at_its_least_loss(tmp_path):
+    """Passes count from 1, and the curves began at 0: the line stood one pass after the least."""
+    pytest.importorskip("matplotlib")
+    summary = TrainingSummary(
+        method="mdrff",
+        choice="",
+        pair_count=90,
+        train_count=80,
+        test_count=10,
+        excluded={},
+        horizon_count=0,
+        epoch_count=4,
+        best_epochs=(2,),
+        curve=((4.0, 5.0), (3.0, 4.0), (2.0, 4.5), (1.0, 6.0)),
+    )
+    figure = summary.plot(tmp_path / "training.png")
+    assert figure is not None
+    _, validation, kept = figure.axes[0].lines
+    x, y = np.array(validation.get_xdata()), np.array(validation.get_ydata())
+    assert x.tolist() == [1, 2, 3, 4]
+    assert np.array(kept.get_xdata()).tolist() == [x[y.argmin()]] * 2

@@ -94,8 +94,10 @@ class TrainingSummary:
         FigureCanvasAgg(figure)
         axes = figure.subplots()
         training, validation = np.array(self.curve, dtype=float).T
-        axes.plot(training, label="training")
-        axes.plot(validation, label="validation, decides when to stop")
+        # As `best_epochs` counts them.
+        passes = np.arange(1, len(self.curve) + 1)
+        axes.plot(passes, training, label="training")
+        axes.plot(passes, validation, label="validation, decides when to stop")
         for number, best in enumerate(self.best_epochs):
             label = "weights kept, by member" if number == 0 else None
             axes.axvline(best, color="0.6", linewidth=0.8, zorder=0, label=label)
