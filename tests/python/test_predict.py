@@ -284,6 +284,20 @@ def test_a_funnel_above_the_camera_is_told(
         assert asked is is_told, height
 
 
+def test_a_height_in_millimetres_is_asked_for_where_no_pour_is_seen(
+    inferred: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It told that too few pours could be used, and nothing of the 70 m."""
+    file = inferred / "funnel.toml"
+    few = {"grains.count": 30, "end.horizon": 10.0}
+    file.write_text(gc.Scene.funnel().with_(few, preset="fast").to_toml())
+    words = ["--at", "funnel.height=120", "--pours", "2", "--threads", "1"]
+    assert main(["predict", str(inferred), str(file), *words]) == 2
+    told = capsys.readouterr().err
+    assert "0 usable pours" in told and "funnel.height = 120 m" in told
+    assert "is it in metres?" in told
+
+
 def test_another_engine_than_the_material_was_inferred_with_is_told(
     inferred: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

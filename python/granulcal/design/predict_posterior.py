@@ -54,10 +54,13 @@ def predict_posterior(
         forward = Forward(Path(folder), threads or cores())
         forward.fill("pours", asked)
         rows = np.concatenate([forward.pours(*one) for one in asked])
-    names = Measures.of(scenes[0]).names
-    found = Prediction.of_pours("posterior", names, rows, level, asked=pours)
-    of_condition = (*_asked_for(posterior, at), *doubt_of_funnel("the condition", scenes[0]))
-    return replace(found, doubts=(*of_condition, *found.doubts))
+    names, of_funnel = Measures.of(scenes[0]).names, doubt_of_funnel("the condition", scenes[0])
+    try:
+        found = Prediction.of_pours("posterior", names, rows, level, asked=pours)
+    except ObservationError as error:
+        # Too few pours are seen: most often why.
+        raise ObservationError("; ".join([str(error), *of_funnel])) from None
+    return replace(found, doubts=(*_asked_for(posterior, at), *of_funnel, *found.doubts))
 
 
 def poured_scenes(
