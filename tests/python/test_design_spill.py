@@ -55,6 +55,22 @@ def test_curve_of_a_known_binomial_is_found():
         assert inside.mean() > 0.8
 
 
+def test_the_json_of_a_spill_answers_at_most(tmp_path, capsys):
+    """With --json the answer to --at-most stood nowhere."""
+    from granulcal.cli import main
+
+    bowl, out = _small_bowl(tmp_path / "bowl.toml"), tmp_path / "spill"
+    words = ["design", "-q", "spill", str(bowl), "--heights", "0.1", "0.4", "--pours", "24"]
+    words += ["--grains", "1", "59", "--at-most", "0.2", "-o", str(out), "--json"]
+    assert main(words) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told == json.loads((out / "spill.json").read_text()) and told["at_most"] == 0.2
+    for each in told["probabilities"]:
+        within = np.maximum(each["probability"], each["interval90"][1]) <= 0.2
+        last = len(within) if within.all() else int(np.argmin(within))
+        assert each["highest"] == (told["heights"][last - 1] if last else None)
+
+
 def test_seven_numbers_of_grains_are_seven_lines(monkeypatch, tmp_path):
     """The seventh had the colour of the first, and the legend lay over the curves."""
     from granulcal.design import forecast as drawn

@@ -333,7 +333,7 @@ def _spill(options: argparse.Namespace) -> int:
         seed=options.seed,
         threads=options.threads,
     )
-    forecast.save(options.out)
+    forecast.save(options.out, options.at_most)
     code = _code(forecast.unusable, draws is None or draws.is_inside)
     if options.json:
         print((options.out / "spill.json").read_text(encoding="utf-8"), end="")

@@ -81,8 +81,11 @@ class SpillForecast:
             said += ", near the lowest height poured: pours from lower would tell"
         return said
 
-    def save(self, folder: str | PathLike[str]) -> None:
-        """Writes spill.csv (one row for each k and height), spill.json and spill.png."""
+    def save(self, folder: str | PathLike[str], at_most: float | None = None) -> None:
+        """Writes spill.csv (one row for each k and height), spill.json and spill.png.
+
+        With `at_most` spill.json has the `highest` height of each k, null where there is none.
+        """
         rows = [
             {
                 "height": float(height),
@@ -114,10 +117,13 @@ class SpillForecast:
                     "grains": k,
                     "probability": self.probability[i].tolist(),
                     "interval90": [self.low[i].tolist(), self.high[i].tolist()],
+                    **({} if at_most is None else {"highest": self.highest(k, at_most)}),
                 }
                 for i, k in enumerate(self.grains)
             ],
         }
+        if at_most is not None:
+            document["at_most"] = at_most
         write_beside(Path(folder) / "spill.json", json.dumps(document, indent=1) + "\n")
         self.plot(Path(folder) / "spill.png")
 
