@@ -212,16 +212,18 @@ def stand(
         reason = f"{reason}; at the sealed conditions {found.beside('it')}"
     if sealed is not None and found.is_no_nearer:
         # Who reads one sentence reads the first.
-        reason = f"{_no_nearer(sealed)}; {reason}"
+        reason = f"{_no_nearer(verdict, sealed)}; {reason}"
     if reason == verdict.reason:
         return found
     return replace(found, verdict=replace(verdict, reason=reason))
 
 
-def _no_nearer(sealed: Improvement) -> str:
+def _no_nearer(verdict: Verdict, sealed: Improvement) -> str:
+    # Of a set the model is the most probable member's.
+    named = verdict.named[:1] if verdict.kind == "SET" else verdict.named
     off, base = sealed.total_after.square, sealed.total_before.square
     low, high = sealed.gain_interval
     return (
-        f"at the sealed conditions D² is {off:.3g} with it and {base:.3g} without (95 % of what it "
-        f"takes away: {low:.3g} to {high:.3g})"
+        f"at the sealed conditions D² is {off:.3g} with {' and '.join(named)} and {base:.3g} "
+        f"without (95 % of what that takes away: {low:.3g} to {high:.3g})"
     )

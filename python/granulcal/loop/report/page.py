@@ -108,7 +108,7 @@ def sentence_of(standing: Standing, seen: Sequence[Seen] = ()) -> str:
         return "The model explains these pours: pours of it leave no more than chance does."
     said = _sentence_of(standing.verdict)
     if standing.is_no_nearer:
-        return f"{said} But it predicts no better where nothing was fitted."
+        return f"{said} Nothing shows that it predicts better where nothing was fitted."
     return said
 
 
