@@ -85,6 +85,16 @@ def test_a_second_effect_is_told_from_none_as_a_first_one_is() -> None:
     assert (found.kind, found.named) == ("SET", ("count", "tilt"))
 
 
+@pytest.mark.parametrize(("alone", "kind"), [(1.0, "RESIDUAL"), (3.1, "EFFECT")])
+def test_a_member_that_a_pair_gives_way_to_is_told_from_no_effect(alone: float, kind: str) -> None:
+    # Neither of the two is told from the next: pair, member, none.
+    members = (model(alone, 0), 0.001), (model(0.5, 2), 0.001)
+    found = word((model(alone + 2.5, 0, 2), 0.5), *members)
+    assert found.kind == kind and found.named == (("drag",) if kind == "EFFECT" else ())
+    if kind == "RESIDUAL":
+        assert "the best effect is not told from none: 1.0 nat" in found.reason
+
+
 def explained(*of: tuple[tuple[str, ...], float, float]) -> tuple[Explanation, ...]:
     """Explanations by effects, log probability and the strength of each effect."""
     return tuple(

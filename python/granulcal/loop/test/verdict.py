@@ -10,8 +10,8 @@
 | UNEXPLAINED | p <= `name`, and no model of one or two effects leaves nothing |
 
 A second effect has to be told from none as a first one has: a pair that is not `rivals` nat more
-probable than its better member alone gives way to that one. What the member leaves is then asked of
-its own pours (`standing.py`).
+probable than its better member alone gives way to that one, which has to be told from none itself.
+What the member leaves is then asked of its own pours (`standing.py`).
 """
 
 from dataclasses import dataclass
@@ -83,18 +83,17 @@ def decide(
         why = f"no one or two effects of the library explain it (best p after a fit {best:.3g})"
         return Verdict("UNEXPLAINED", (), (), p, why)
     best = max(adequate, key=by_probability)
+    alone = {m.effects[0]: m for m, _ in models if len(m.effects) == 1}
+    lead = max((alone[k] for k in best.effects if k in alone), key=by_probability, default=best)
+    if best.log_probability - lead.log_probability <= thresholds.rivals:
+        best = lead
     gain = best.log_probability - none.log_probability
-    if gain <= thresholds.rivals:  # No effect is a rival like any other.
+    if gain <= thresholds.rivals:  # No effect is a rival like any other, of one of a pair as well.
         why = (
             f"something is left (p = {p:.3g}), but the best effect is not told from none: "
             f"{gain:.1f} nat of log probability, {thresholds.rivals:g} asked"
         )
         return Verdict("RESIDUAL", (), (), p, why)
-    alone = {m.effects[0]: m for m, _ in models if len(m.effects) == 1}
-    lead = max((alone[k] for k in best.effects if k in alone), key=by_probability, default=best)
-    if best.log_probability - lead.log_probability <= thresholds.rivals:
-        best = lead
-        gain = best.log_probability - none.log_probability
     if len(best.effects) == 2:
         # The one that explains more by itself comes first.
         members = tuple(
