@@ -32,6 +32,7 @@ from granulcal.loop.check.alarms import (
     of_rows,
     of_untried,
 )
+from granulcal.loop.check.alone import of_alone
 from granulcal.loop.check.checks import (
     calibrated,
     corrected,
@@ -225,6 +226,8 @@ def close_loop(
     alarms += of_ends(verdict, found.best, task) + of_untried(verdict, task.untried)
     alarms += of_base_fit(verdict, settled.at_base, rules)
     alarms += of_prior(verdict, found.base, task)
+    if verdict.kind != "NONE":
+        alarms += of_alone(surrogate, observed, found, rules)
     # A mean over time is steadier than a pour.
     single = [o for c, o in zip(analysis.fitted, observed, strict=True) if not c.averaged]
     at_fit = found.fit_of(found.best)
