@@ -54,6 +54,16 @@ def actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
             yield action
 
 
+def _require_folder(path: Path) -> None:
+    """Refuses a file in a folder that is not there, which is not made for it.
+
+    Raises:
+        ValueError: names the folder.
+    """
+    if not path.parent.is_dir():
+        raise ValueError(f"the folder {path.parent} of {path} does not exist; make it first")
+
+
 def check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
     """Checks every path that a command line names.
 
@@ -80,6 +90,7 @@ def check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
                 require_place(path)
             if kind == "figure":
                 require_figure(path)
+                _require_folder(path)
         except (FileExistsError, ValueError) as error:
             raise ValueError(f"{argument}: {error}") from None
 

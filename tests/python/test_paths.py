@@ -347,3 +347,14 @@ def test_a_film_lasts_as_long_as_its_rate_says_and_tells_what_it_lacks(tmp_path,
         assert getattr(image, "n_frames", 1) == 5
     assert cli.main([*words, "--most-frames", "100"]) == 0
     assert "left out" not in capsys.readouterr().err
+
+
+def test_a_figures_folder_is_asked_for_before_the_work(tmp_path, capsys):
+    """The posterior was told and written, and only then was there no folder for its picture."""
+    recording, out = tmp_path / "a.png", tmp_path / "posterior.json"
+    recording.write_bytes(b"")
+    words = ["infer", "funnel", str(recording), "-o", str(out)]
+    assert cli.main([*words, "--plot", str(tmp_path / "no" / "pair.png")]) == 2
+    told = capsys.readouterr()
+    assert "--plot: the folder" in told.err and "does not exist; make it first" in told.err
+    assert not told.out and not out.exists()
