@@ -27,6 +27,9 @@ pub struct CameraFile {
     pub segmentation: Segmentation,
 }
 
+/// Least focal length over the image's side: no lens without distortion sees 168 degrees.
+const LEAST_FOCAL: f64 = 0.05;
+
 /// The keys of the file.
 ///
 /// `cx` and `cy` follow OpenCV and the RealSense SDK: the centre of the first pixel is (0, 0).
@@ -174,6 +177,17 @@ impl CameraToml {
             let allowed = "given by all of width, height, fx, fy, cx, cy, or by none";
             return Err(DatasetError::content(path, "the lens", found, allowed));
         };
+        for (name, focal, side, pixels) in
+            [("fx", fx, "width", width), ("fy", fy, "height", height)]
+        {
+            let least = LEAST_FOCAL * pixels as f64;
+            if focal > 0.0 && focal < least {
+                let allowed = format!(
+                    "in pixels, at least {least} (a twentieth of the {side}): is it in millimetres or metres?"
+                );
+                return Err(DatasetError::content(path, name, focal.to_string(), allowed));
+            }
+        }
         Intrinsics::from_integer_centres(width, height, fx, fy, cx, cy)
             .map(Some)
             .map_err(|source| DatasetError::Recording { path: path.to_owned(), source })
@@ -196,6 +210,21 @@ pub(crate) fn camera_of(intrinsics: Intrinsics) -> Camera {
 mod tests {
     use super::*;
     use granulcal_features::Threshold;
+
+    #[test]
+    fn a_focal_length_that_is_not_in_pixels_is_asked_for_its_unit() {
+        let text = "width = 640\nheight = 480\nfx = 600.0\nfy = 600.0\ncx = 319.5\ncy = 239.5\n";
+        let parse = |text: &str| CameraFile::parse(Path::new("camera.toml"), text);
+        assert!(parse(text).is_ok());
+        for (key, least) in
+            [("fx", "at least 32 (a twentieth of the width)"), ("fy", "at least 24 (")]
+        {
+            let changed = text.replace(&format!("{key} = 600.0"), &format!("{key} = 1.93"));
+            let error = parse(&changed).unwrap_err().to_string();
+            assert!(error.contains(key) && error.contains("1.93"), "{error}");
+            assert!(error.contains(least) && error.contains("millimetres"), "{error}");
+        }
+    }
 
     #[test]
     fn a_camera_that_somebody_changed_is_not_replaced() {

@@ -8,7 +8,7 @@ pub(crate) struct DepthFrame {
     pub(crate) values: Values,
 }
 
-/// Depth row by row; 0, and what is not finite, is no data.
+/// Depth row by row; 0, the largest count, and what is not finite are no data.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Values {
     /// Counts of a unit.

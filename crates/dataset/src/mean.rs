@@ -88,7 +88,7 @@ impl Mean {
             self.state = match first {
                 Values::Counts(counts) => {
                     let mut sums = Sums::new(counts.len());
-                    sums.add(counts.iter().map(|&count| u32::from(count)));
+                    sums.add(counts.iter().copied().map(valid_count));
                     State::Counts(sums)
                 }
                 Values::Metres(metres) => {
@@ -104,7 +104,7 @@ impl Mean {
         }
         match (&mut self.state, &frame.values) {
             (State::Counts(sums), Values::Counts(counts)) => {
-                sums.add(counts.iter().map(|&count| u32::from(count)));
+                sums.add(counts.iter().copied().map(valid_count));
             }
             (State::Metres(sums), Values::Metres(metres)) => {
                 sums.add(metres.iter().copied().map(valid_metres));
@@ -137,7 +137,7 @@ impl Mean {
         match (&self.state, values) {
             (State::Counts(sums), Values::Counts(counts)) => {
                 for (pixel, (&sum, &valid)) in sums.sums.iter().zip(&sums.valid).enumerate() {
-                    compare(pixel, f64::from(sum), valid, f64::from(counts[pixel]));
+                    compare(pixel, f64::from(sum), valid, f64::from(valid_count(counts[pixel])));
                 }
             }
             (State::Metres(sums), Values::Metres(metres)) => {
@@ -191,7 +191,7 @@ impl Mean {
         let metres = |count: f64| (count * self.unit) as f32;
         let depth: Vec<f32> = match self.state {
             State::One(Values::Counts(counts)) => {
-                counts.iter().map(|&count| metres(f64::from(count))).collect()
+                counts.iter().map(|&count| metres(f64::from(valid_count(count)))).collect()
             }
             State::One(Values::Metres(values)) => {
                 values.into_iter().map(|value| valid_metres(value) as f32).collect()
@@ -225,6 +225,11 @@ impl<T: Copy + Default + PartialEq + std::ops::AddAssign> Sums<T> {
             }
         }
     }
+}
+
+/// The count if it is a measurement, else 0: cameras write the largest one for what they do not know, too.
+pub(crate) fn valid_count(count: u16) -> u32 {
+    if count == u16::MAX { 0 } else { u32::from(count) }
 }
 
 /// The value if it is a measurement, else 0.
@@ -265,6 +270,14 @@ mod tests {
     }
 
     #[test]
+    fn the_largest_count_is_no_data() {
+        let full = u16::MAX;
+        assert_eq!(mean(vec![counts(vec![4, full, full - 1])], 0.25), [1.0, 0.0, 16383.5]);
+        let frames = vec![counts(vec![100, full]), counts(vec![full, full]), counts(vec![200, 7])];
+        assert_eq!(mean(frames, 1.0), [150.0, 7.0]);
+    }
+
+    #[test]
     fn other_images_are_refused() {
         let mut one = Mean::new(counts(vec![1, 2]), 1.0);
         assert!(
@@ -276,7 +289,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_mean_lies_between_the_extremes(values in prop::collection::vec(1u16.., 1..40)) {
+        fn a_mean_lies_between_the_extremes(values in prop::collection::vec(1..u16::MAX, 1..40)) {
             let frames = values.iter().map(|&value| counts(vec![value])).collect();
             let mean = f64::from(mean(frames, 1.0)[0]);
             let exact = values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64;

@@ -95,8 +95,9 @@ pub(crate) fn counts(image: &DepthImage, depth_unit: f64) -> Result<Vec<u16>, Da
     let deepest = image.depth.iter().copied().filter(|d| d.is_finite()).fold(0.0, f32::max);
     let most = (f64::from(deepest) / depth_unit).round();
     let got = || format!("{depth_unit} with a farthest depth of {deepest} m");
-    if most > f64::from(u16::MAX) {
-        return refuse(got(), "large enough that 65535 counts reach the deepest pixel");
+    // The largest count is no data.
+    if most >= f64::from(u16::MAX) {
+        return refuse(got(), "large enough that 65534 counts reach the deepest pixel");
     }
     if deepest > 0.0 && most == 0.0 {
         return refuse(got(), "at most twice the farthest depth (else every depth is 0)");

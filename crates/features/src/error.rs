@@ -229,6 +229,10 @@ fn no_grain(
     cleaned: Option<Cleaned>,
     extent: Option<(f64, f64)>,
 ) -> String {
+    if valid == 0 && above == 0 {
+        return "no pixel has data on or above the ground: are lens and depths those of the camera?"
+            .to_owned();
+    }
     if valid == 0 {
         return format!(
             "all {above} pixels with data are above max_height: are the depths in metres?"

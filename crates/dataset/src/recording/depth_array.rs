@@ -63,7 +63,12 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Depths, Da
         return Err(DatasetError::content(&path, "the depths", found.to_string(), allowed));
     }
     let window = options.window(&path, count as u64)?;
-    let metres = |value: &f64| (value * unit.unwrap_or(1.0)) as f32;
+    let metres = |value: &f64| match unit {
+        // As in an image of counts.
+        Some(_) if *value == f64::from(u16::MAX) => 0.0,
+        Some(unit) => (value * unit) as f32,
+        None => *value as f32,
+    };
     let frames = array.values.chunks_exact(width * height);
     let chosen = frames.skip(window.start as usize).take((window.end - window.start) as usize);
     let images = chosen.map(|frame| frame.iter().map(metres).collect()).collect();
@@ -102,6 +107,8 @@ mod tests {
         let counts = npy::encode_integers(&[2, 3], [400, 400, 0, 400, 500, 0]);
         let found = read(&unit, &counts, &options).unwrap();
         assert_eq!((depth(&found), found.depth_unit), (wanted, Some(1e-3)));
+        let full = npy::encode_integers(&[2, 3], [400, 400, 65535, 400, 500, 0]);
+        assert_eq!(depth(&read(&unit, &full, &options).unwrap()), depth(&found));
         assert!(read(CAMERA, &counts, &options).unwrap_err().contains("no depth_unit"));
         // The unit says what the depths are rounded to, not what they are in.
         let found = read(&unit, &metres, &options).unwrap();
