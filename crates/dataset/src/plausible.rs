@@ -12,6 +12,7 @@ use granulcal_scene::{Mask, Prior, Projection, Scene};
 mod bare;
 mod doubts;
 mod frames;
+mod size;
 
 use crate::{DatasetError, Room};
 use bare::Bare;
@@ -25,7 +26,7 @@ const VOLUME_MARGIN: f64 = 4.0;
 /// Room that grains take over their own volume, at least: they take 1.27 to 1.55 times as much in heaps and single
 /// layers of 2000, and of 60 grains that lie apart, which a coarse image samples, 0.88 to 1.27.
 const LEAST_VOLUME: f64 = 0.7;
-/// Height of the highest grain over the diameter of the least, at least.
+/// Height of the highest grain over the width of the least, at least.
 const LEAST_HEIGHT: f64 = 0.5;
 /// A formation that stays so far from the image's edge, over half the image, and holds so much of the grains, has left
 /// none out of view: of 60 pours of the default prior each that had came within 0.06 of it, or held less than 0.05.
@@ -58,6 +59,8 @@ pub struct Limits {
     pub least_volume: f64,
     /// Diameter of a typical grain `[m]`.
     pub diameter: f64,
+    /// Volume of a typical grain `[m³]`.
+    pub grain: f64,
     /// Side of the square of ground that its images show `[m]`.
     pub field: f64,
     /// Width of its images' pixels on the ground `[m]`.
@@ -103,6 +106,7 @@ impl Limits {
             volume: a.volume.max(b.volume),
             least_volume: a.least_volume.min(b.least_volume),
             diameter: a.diameter.max(b.diameter),
+            grain: a.grain.max(b.grain),
             field: a.field.max(b.field),
             resolution: a.resolution.max(b.resolution),
             distance: a.distance.zip(b.distance).map(|(a, b)| (a.0.min(b.0), a.1.max(b.1))),
@@ -120,16 +124,17 @@ impl Limits {
         let simulation = Simulation::new(scene, 0).ok()?;
         let (positions, radii) = (simulation.positions(), simulation.radii());
         let tops = positions.iter().zip(&*radii).map(|(at, radius)| at.z + radius);
-        let grains: f64 = radii.iter().map(|r| 4.0 / 3.0 * std::f64::consts::PI * r.powi(3)).sum();
+        let grains = size::volume(scene, &radii);
         let field = scene.camera.field_width;
         // The grains of a bed are the ground that a formation lies on, and no part of it.
         let all_seen = if scene.bed.is_some() { 0.0 } else { LEAST_VOLUME * grains };
         Some(Self {
             height: HEIGHT_MARGIN * tops.fold(0.0, f64::max),
-            least_height: 2.0 * LEAST_HEIGHT * radii.iter().copied().fold(f64::INFINITY, f64::min),
+            least_height: LEAST_HEIGHT * size::least_width(scene, &radii),
             volume: VOLUME_MARGIN * grains,
             least_volume: all_seen,
             diameter: scene.grains.diameter,
+            grain: size::volume_of_one(scene),
             field,
             resolution: scene.camera.ground_resolution(),
             distance: (scene.camera.projection == Projection::Pinhole)

@@ -144,7 +144,7 @@ impl Limits {
     /// How many grains lie in their own directions: those of a heap, else no more than there are pixels, for of
     /// scattered ones coarse pixels miss most, and what they hit takes the room of the others.
     fn independent(&self, formation: &Formation) -> f64 {
-        let grains = formation.volume / (std::f64::consts::PI / 6.0 * self.diameter.powi(3));
+        let grains = formation.volume / self.grain;
         let pixels = formation.masked_count as f64;
         let is_heap = formation.body_share() > HEAP && pixels > HEAP_PIXELS;
         if is_heap { grains } else { grains.min(pixels) }
