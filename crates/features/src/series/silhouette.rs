@@ -82,7 +82,8 @@ impl Silhouette {
     }
 
     /// Height of the surface in each column `[m]`: where from above the share of frames that hide first reaches
-    /// `level`, linear between cells; NaN where it does nowhere, or without a frame.
+    /// `level`, linear between cells; NaN where it does nowhere, where the top of the picture is hidden so that the
+    /// surface is above it, or without a frame.
     pub fn surface(&self, level: f64) -> Vec<f64> {
         self.hidden.chunks(self.cells).map(|column| self.height(column, level)).collect()
     }
@@ -93,8 +94,10 @@ impl Silhouette {
         let Some(cell) = (0..self.cells).rev().find(is_hidden).filter(|_| self.frames > 0) else {
             return f64::NAN;
         };
-        let above = if cell + 1 < self.cells { share(cell + 1) } else { 0.0 };
-        let beyond = (share(cell) - level) / (share(cell) - above);
+        if cell + 1 == self.cells {
+            return f64::NAN;
+        }
+        let beyond = (share(cell) - level) / (share(cell) - share(cell + 1));
         self.bottom + self.step * (cell as f64 + 0.5 + beyond)
     }
 }
@@ -144,6 +147,18 @@ mod tests {
         }
         assert!((side.surface(0.5)[0] - 4e-3).abs() < 2e-5, "{:?}", side.surface(0.5));
         assert!((side.surface(0.25)[0] - 5e-3).abs() < 2e-5, "{:?}", side.surface(0.25));
+    }
+
+    #[test]
+    fn a_surface_above_the_picture_is_nowhere() {
+        // Grains stand 12 mm high; the picture ends at 10 mm beside them and below the top of the lower heap.
+        let mut side = Silhouette::new(&[0.0, 5e-3], (0.0, 0.01), RADIUS).unwrap();
+        let heap = |x: f64, count: i32| (0..count).map(move |i| (x, 1e-3 * f64::from(2 * i + 1)));
+        let grains: Vec<_> =
+            heap(0.0, 6).chain(heap(5e-3, 3)).map(|(x, z)| Vector3::new(x, 0.0, z)).collect();
+        side.add(&grains, &vec![RADIUS; grains.len()]).unwrap();
+        let found = side.surface(0.5);
+        assert!(found[0].is_nan() && (found[1] - 6e-3).abs() < 1e-4, "{found:?}");
     }
 
     #[test]
