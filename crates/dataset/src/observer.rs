@@ -173,11 +173,19 @@ impl Observer {
         if !(is_due || is_last) {
             return;
         }
-        self.next = ((time + half - self.begin) * self.rate).floor().max(0.0) as u64 + 1;
-        let (positions, radii) = (simulation.positions(), simulation.radii());
-        let radii_out = simulation.radii_out();
-        let liquid = simulation.liquid_profile();
-        let frame = Frame { time: time - self.begin, positions, radii, radii_out, liquid };
+        let number = ((time + half - self.begin) * self.rate).floor().max(0.0) as u64;
+        self.next = number + 1;
+        let (since, stated) = (time - self.begin, number as f64 / self.rate);
+        // The first stands for the begin, half a substep late or not: nothing was seen before it.
+        let since = if number == 0 && is_due { since.min(0.0) } else { since };
+        let frame = Frame {
+            time: since,
+            stands_for: if is_due { since.max(stated) } else { since },
+            positions: simulation.positions(),
+            radii: simulation.radii(),
+            radii_out: simulation.radii_out(),
+            liquid: simulation.liquid_profile(),
+        };
         for observation in &mut self.observations {
             observation.see(&frame);
         }

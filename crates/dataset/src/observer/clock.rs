@@ -49,7 +49,8 @@ mod tests {
         // Rings of 1 mm, full up to the radius: half a ring beyond the last middle.
         let rings = (radius * 1e3).round() as usize;
         let liquid = Some((1e-3, vec![1e-2; rings]));
-        Frame { time, positions: Vec::new(), radii: Vec::new(), radii_out: Vec::new(), liquid }
+        let (positions, radii, radii_out) = (Vec::new(), Vec::new(), Vec::new());
+        Frame { time, stands_for: time, positions, radii, radii_out, liquid }
     }
 
     #[test]

@@ -52,7 +52,7 @@ impl Observation for Images {
 
     fn see(&mut self, frame: &Frame) {
         // A time that no sample has met when the next one is due has the next one's image.
-        while self.spec.times.get(self.seen.len()).is_some_and(|t| *t <= frame.time + 1e-9) {
+        while self.spec.times.get(self.seen.len()).is_some_and(|t| *t <= frame.stands_for + 1e-9) {
             self.seen.push(self.measure(&frame.positions, &frame.radii));
         }
     }

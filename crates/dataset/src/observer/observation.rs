@@ -59,6 +59,8 @@ impl Series {
 pub(super) struct Frame {
     /// After the observation's begin `[s]`.
     pub(super) time: f64,
+    /// The latest stated time that it is a sample of `[s]`: up to half a substep after `time`, which is the nearest.
+    pub(super) stands_for: f64,
     pub(super) positions: Vec<Vector3<f64>>,
     pub(super) radii: Vec<f64>,
     /// Of the grains that have left the scene.

@@ -287,3 +287,35 @@ fn grains_above_a_height_are_in_no_image() {
     assert!((of(Some(0.05)) - 0.004).abs() < 3e-4, "{}", of(Some(0.05)));
     assert!((of(None) - 0.092).abs() < 3e-4, "{}", of(None));
 }
+
+#[test]
+fn the_first_sample_stands_for_the_begin() {
+    // Half way between two substeps of 0.5 ms, and little before or behind one.
+    for begin in [0.02, 0.02025, 0.0203, 0.0201] {
+        let mut scene = scene();
+        let observe = scene.observe.as_mut().unwrap();
+        observe.begin = begin;
+        observe.front.as_mut().unwrap().times = vec![0.0, 0.05];
+        let (pour, observer) = run(&scene);
+        let found = value(&scene, &observer.observed(&pour), "front_radius[0]");
+        assert!((found - 0.002).abs() < 5.1e-4, "{begin}: {found}");
+    }
+}
+
+#[test]
+fn an_image_is_of_the_sample_that_is_nearest_to_its_frame() {
+    // A film of 30 frames a second: its third frame, 66.7 ms, falls between the substeps at 66.5 and 67 ms.
+    let mut scene = scene();
+    let observe = scene.observe.as_mut().unwrap();
+    observe.begin = 0.0;
+    observe.rate = 30.0;
+    observe.images = Some(ObserveImages { times: vec![2.0 / 30.0], below: None });
+    scene.start = Start::Positions {
+        positions: [[0.0, 0.0], [0.02, 0.0], [0.0, 0.02]].map(|[x, y]| [x, y, 0.092]).into(),
+    };
+    (scene.grains.count, scene.camera.downsample) = (3, 2);
+    let (pour, observer) = run(&scene);
+    let found = value(&scene, &observer.observed(&pour), "max_z[0.06666666666666667]");
+    let fallen = 0.094 - 0.5 * 9.81 * 0.0665_f64.powi(2);
+    assert!((found - fallen).abs() < 5e-4, "{found} {fallen}");
+}
