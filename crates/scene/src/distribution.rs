@@ -83,12 +83,12 @@ impl Distribution {
         }
     }
 
-    /// Values that stand for the range: the bounds, the mean where a normal has none, the fixed value.
     /// Whether [`Self::extremes`] leaves values out that may be drawn: those of a normal that is not cut off.
     pub(crate) fn is_unbounded(&self) -> bool {
         matches!(self, Self::Normal { low, high, .. } if low.is_none() || high.is_none())
     }
 
+    /// Values that stand for the range: the bounds, the mean where a normal has none, the fixed value.
     pub(crate) fn extremes(&self) -> Vec<f64> {
         match *self {
             Self::Uniform { low, high } | Self::LogUniform { low, high } => vec![low, high],

@@ -145,7 +145,8 @@ pub struct ObserveSpill {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObserveImages {
-    /// When the images are taken, after `begin`, rising `[s]`: each is of the first sample at or after its time.
+    /// When the images are taken, after `begin`, rising `[s]`: each is of the first sample that is due at or after its
+    /// time, on the substep nearest to where it is due.
     pub times: Vec<f64>,
     /// Grains with their centre above are in no image, as those that a funnel still hides `[m]`; none are left out if
     /// absent.
@@ -176,6 +177,15 @@ impl Observe {
         self.liquid.is_some() || self.clock.is_some()
     }
 
+    /// Whether anything is looked at before the end.
+    fn is_over_time(&self) -> bool {
+        self.surface.is_some()
+            || self.front.is_some()
+            || self.asks_for_liquid()
+            || self.discharge.is_some()
+            || self.images.is_some()
+    }
+
     pub(crate) fn check(&self, horizon: f64, diameter: f64) -> Result<(), SceneError> {
         positive("observe.rate", self.rate)?;
         non_negative("observe.begin", self.begin)?;
@@ -185,6 +195,11 @@ impl Observe {
         let rest = horizon - self.begin;
         if self.rate * rest > MAX_SAMPLES {
             let allowed = "at most a million samples until end.horizon";
+            return Err(SceneError::range("observe.rate", self.rate, allowed));
+        }
+        // Values between begin and end would be drawn on the straight line that joins them.
+        if self.is_over_time() && self.rate * rest < 1.0 {
+            let allowed = "samples a second, at least one between observe.begin and end.horizon";
             return Err(SceneError::range("observe.rate", self.rate, allowed));
         }
         if let Some(surface) = &self.surface {
@@ -328,6 +343,32 @@ mod tests {
         assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
         let changed = scene.with("observe.front.times.1", 0.3).unwrap();
         assert_eq!(changed.get("observe.front.times.1").unwrap(), 0.3);
+    }
+
+    #[test]
+    fn a_rate_is_no_interval() {
+        // Begin is at 0.5 s and the horizon at 4 s: 0.01 is a hundredth of a second.
+        let error = scene().with("observe.rate", 0.01).unwrap_err().to_string();
+        assert!(error.contains("observe.rate must be samples a second, at least one"), "{error}");
+        scene().with("observe.rate", 0.3).unwrap();
+        // What is looked at at the end alone needs none.
+        let mut scene = scene();
+        let Observe { rate, begin, radius, spill, .. } = scene.observe.take().unwrap();
+        let (surface, front, liquid, clock, discharge, images) = Default::default();
+        let observe = Observe {
+            rate,
+            begin,
+            surface,
+            front,
+            liquid,
+            clock,
+            discharge,
+            radius,
+            spill,
+            images,
+        };
+        scene.observe = Some(observe);
+        scene.with("observe.rate", 0.01).unwrap();
     }
 
     #[test]
