@@ -63,6 +63,22 @@ def test_the_frame_has_the_points_of_the_image(projection: str) -> None:
     np.testing.assert_allclose(Frame.of(seen).points(), seen.points(), rtol=0, atol=1e-9)
 
 
+def test_a_frame_and_a_recording_have_the_same_diameter_of_a_grain() -> None:
+    unequal = scene("pinhole").with_({"effects.polydispersity.cv": 0.5})
+    seen = gc.simulate(unequal, seed=4)
+    # The mean diameter of such grains is a fifth less.
+    assert 2 * seen.radii.mean() < 0.9 * unequal.get("grains.diameter")
+    frame = Frame.of(seen)
+    assert frame.diameter == unequal.get("grains.diameter")
+    expected = gc.diagnostic_statistics(
+        seen.points(),
+        grain_diameter=unequal.get("grains.diameter"),
+        spacing=frame.spacing,
+        pour_axis=(0.0, 0.0),
+    )
+    np.testing.assert_allclose(seen.diagnostic_statistics(), expected, rtol=1e-9, atol=1e-12)
+
+
 def test_an_offset_moves_heights_by_itself_and_nothing_else(pour: gc.Pour) -> None:
     measures = Measures.of(pour.scene)
     plain = dict(zip(measures.names, measures.of_pour(pour), strict=True))

@@ -327,6 +327,7 @@ fn make_row(
     let status = observer.status(&pour);
     let observed = observer.observed(&pour).statistics;
     let seen = observe(&scene.camera, &pour, seed).and_then(|seen| {
+        let seen = seen.with_grain_diameter(scene.grains.diameter);
         let Ok(values) = seen.statistics else { return Ok(None) };
         Ok(Some((values, seen.diagnostics().map_err(DatasetError::Features)?)))
     });

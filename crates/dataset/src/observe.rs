@@ -15,8 +15,7 @@ use crate::DatasetError;
 use crate::drawn::Drawn;
 use crate::random::{camera_seed, sensor_seed};
 
-/// Height above the ground `[m]` from which a pixel of a noise-free image shows a grain: the rounding
-/// of an f32 depth.
+/// Height above the ground `[m]` from which a pixel of a noise-free image shows a grain, at least.
 const BARE: f64 = 1e-6;
 
 /// Depth beyond which a view has no data, in distances of its target: the ground goes on to the horizon.
@@ -81,11 +80,27 @@ pub struct Observation {
     pub points: Vec<Vector3<f64>>,
     /// The paper's 16 statistics, or why there are none.
     pub statistics: Result<[f64; 16], TooFewGrains>,
-    /// What the diagnostic statistics have to know: the pour axis is the scene's z axis.
+    /// What the diagnostic statistics have to know: the pour axis is the scene's z axis; the grains' diameter is the
+    /// mean of the spheres', until [`Observation::with_grain_diameter`] says the scene's.
     pub diagnostic_settings: DiagnosticSettings,
 }
 
+/// Diameters that differ by a smaller share are the same, but for the rounding of a mean.
+const SAME_DIAMETER: f64 = 1e-9;
+
 impl Observation {
+    /// The observation with the diameter that the scene states, `[m]`, for that of a grain, as a recording has none
+    /// else: grains of unequal sizes have another mean, and the spheres of a clump are thinner than its ball.
+    #[must_use]
+    pub fn with_grain_diameter(mut self, stated: f64) -> Self {
+        let mean = self.diagnostic_settings.grain_diameter;
+        // Equal balls keep the last bit of their mean.
+        if (mean - stated).abs() > SAME_DIAMETER * stated {
+            self.diagnostic_settings.grain_diameter = stated;
+        }
+        self
+    }
+
     /// The diagnostic statistics of the points.
     ///
     /// # Errors
@@ -123,6 +138,14 @@ pub fn observe(
     observe_grains(camera, &Drawn::of(pour), pour_seed)
 }
 
+/// Height `[m]` from which a pixel of the camera's noise-free image shows a grain: above the rounding of an f32 depth.
+fn bare(camera: &CameraSpec) -> f64 {
+    match camera.projection {
+        Projection::Pinhole => BARE.max(f64::from(f32::EPSILON) * camera.height),
+        Projection::Orthographic => BARE,
+    }
+}
+
 /// The image and the statistics of grains under the camera of a checked scene, as [`observe`].
 pub(crate) fn observe_grains(
     camera: &CameraSpec,
@@ -140,9 +163,10 @@ pub(crate) fn observe_grains(
     let found = match camera.mask {
         Mask::Height => view.grain_points(|_, point| point.z > threshold, threshold),
         Mask::Colour => {
+            let bare = bare(camera);
             let shows_grain: Vec<bool> =
-                clean.points().iter().map(|point| point.is_some_and(|p| p.z > BARE)).collect();
-            view.grain_points(|i, _| shows_grain[i], BARE)
+                clean.points().iter().map(|point| point.is_some_and(|p| p.z > bare)).collect();
+            view.grain_points(|i, _| shows_grain[i], bare)
         }
     };
     let points = match found {
@@ -350,6 +374,31 @@ mod tests {
         assert_eq!((value("isolated_grains"), value("clusters")), (81.0, 0.0));
         assert_eq!(value("count_in_view"), seen.points.len() as f64);
         assert!(value("mass_cos_1").abs() < 0.01 && value("rim_sin_2").abs() < 0.05);
+    }
+
+    #[test]
+    fn a_grain_is_as_wide_as_the_scene_says_on_both_sides() {
+        // Spheres of 2.8 and 5.2 mm in a scene of grains of 5 mm: a recording knows the 5 mm alone.
+        let mut pour = carpet(0.0);
+        pour.radii.iter_mut().enumerate().for_each(|(i, r)| *r *= [0.7, 1.3][i % 2]);
+        let seen = observe(&Scene::drop(0.1).camera, &pour, 1).unwrap();
+        let of_scene = seen.clone().with_grain_diameter(5e-3);
+        let stated = DiagnosticSettings { grain_diameter: 5e-3, ..seen.diagnostic_settings };
+        assert_eq!(of_scene.diagnostics(), diagnostics(&seen.points, &stated));
+        assert_ne!(of_scene.diagnostics(), seen.diagnostics());
+        // Equal balls keep every bit.
+        let equal = observe(&Scene::drop(0.1).camera, &carpet(0.0), 1).unwrap();
+        assert_eq!(equal.clone().with_grain_diameter(4e-3 * (1.0 + 1e-12)), equal);
+    }
+
+    #[test]
+    fn a_camera_far_above_sees_bare_ground_by_colour() {
+        // Of a depth of 100.7 m a number of 32 bits leaves 4 um of rounding.
+        let far = CameraSpec { height: 100.7, mask: Mask::Colour, ..CameraSpec::default() };
+        let near = CameraSpec { height: 10.0, ..far };
+        let found =
+            [near, far].map(|camera| observe(&camera, &carpet(0.0), 1).unwrap().points.len());
+        assert!(found[0].abs_diff(found[1]) <= found[0] / 10, "{found:?}");
     }
 
     #[test]

@@ -23,6 +23,8 @@ pub(crate) struct Pour {
     /// Those of the last substep, or why they cannot be told.
     pub(crate) contacts: Result<Contacts, String>,
     pub(crate) camera: CameraSpec,
+    /// That the scene states [m].
+    pub(crate) grain_diameter: f64,
     pub(crate) views: Vec<ViewSpec>,
     pub(crate) seed: u64,
     pub(crate) cpu_seconds: f64,
@@ -161,6 +163,7 @@ impl Pour {
 
     fn observe(&self, py: Python<'_>) -> PyResult<Observation> {
         let seen = py.detach(|| granulcal_dataset::observe(&self.camera, &self.inner, self.seed));
-        Ok(Observation { inner: seen.map_err(error::dataset)? })
+        let inner = seen.map_err(error::dataset)?.with_grain_diameter(self.grain_diameter);
+        Ok(Observation { inner })
     }
 }

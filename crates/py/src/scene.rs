@@ -212,6 +212,7 @@ impl Scene {
             ),
             inner: pour,
             camera: scene.camera,
+            grain_diameter: scene.grains.diameter,
             views: scene.views.clone(),
             seed,
             cpu_seconds: f64::NAN,

@@ -91,6 +91,7 @@ impl Simulation {
             masses: self.inner.masses(),
             contacts: Contacts::of(&self.inner).map_err(|reason| reason.to_string()),
             camera: scene.camera,
+            grain_diameter: scene.grains.diameter,
             views: scene.views.clone(),
             seed: self.inner.seed(),
             cpu_seconds: self.cpu.as_secs_f64(),

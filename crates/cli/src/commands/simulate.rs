@@ -166,7 +166,7 @@ fn describe(
             tracing::warn!("no statistics: {reason}");
             return Ok(status);
         }
-        other => other?,
+        other => other?.with_grain_diameter(scene.grains.diameter),
     };
     if let Some(path) = &args.depth {
         sides.keep(

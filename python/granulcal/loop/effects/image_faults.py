@@ -57,7 +57,7 @@ class Frame:
         spacing: width of a pixel on the ground [m].
         eye: height of the pinhole camera [m]; infinite for a height map.
         threshold: height above which a pixel is grain [m].
-        diameter: mean diameter of the grains [m].
+        diameter: diameter of a grain, as the scene states it [m].
         lift: what is added to the heights of grains [m].
         aside: where the camera stands from the pour's axis, x and y [m].
     """
@@ -81,7 +81,7 @@ class Frame:
             z = np.where(depth > 0, eye - depth, np.nan)
         else:
             eye, z = np.inf, pour.height_map()
-        diameter = 2 * float(pour.radii.mean())
+        diameter = scene.get("grains.diameter")
         return cls(z, scene.ground_resolution, eye, float(camera["height_threshold"]), diameter)
 
     @property
