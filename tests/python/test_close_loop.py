@@ -79,15 +79,16 @@ def make(
     effects: str = '["tilt.y", "ground.restitution"]',
     scene_text: str = SCENE,
     pours: int = 3,
+    lens: float = 0.0,
 ) -> Path:
     """Writes scene, prior, recordings and the task of pours with `extra` numbers in the scene.
 
-    Each height has `pours` of them.
+    Each height has `pours` of them, of a camera whose focal length is longer than told by `lens`.
     """
     folder.mkdir()
     (folder / "scene.toml").write_text(scene_text)
     (folder / "prior.toml").write_text(PRIOR)
-    camera = Camera.overhead(height=0.3, field_width=0.3, pixels=220)
+    camera = Camera.overhead(height=0.3, field_width=0.3 / (1 + lens), pixels=220)
     lines = ['scene = "scene.toml"', 'prior = "prior.toml"', f"effects = {effects}"]
     for name, base in HEIGHTS.items():
         names = []
@@ -96,7 +97,12 @@ def make(
                 {**TRUTH, **extra, "start.base": base}
             )
             pour = gc.simulate(scene, seed=100 + seed)
-            image, _ = camera.record(pour.positions, pour.radii, folder / f"{name}-{seed}")
+            image, toml = camera.record(pour.positions, pour.radii, folder / f"{name}-{seed}")
+            if lens:
+                told = re.sub(
+                    r"(?m)^f[xy] = .*$", lambda f: f"{f[0][:2]} = 220.0", toml.read_text()
+                )
+                toml.write_text(told)
             names.append(str(Path(image).relative_to(folder)))
         use = "sealed" if name == "between" else "fit"
         lines += ["[[conditions]]", f'name = "{name}"', f'at = {{ "start.base" = {base} }}']
@@ -176,6 +182,17 @@ def test_a_declared_tilt_is_not_found(tmp_path: Path) -> None:
     assert closed.trace.verdict.kind == "NONE"
     page = (tmp_path / "declared" / "report.html").read_text()
     assert f"Closing the loop on {declared}" in page and "granulcal.close_loop(task, " in page
+
+
+@pytest.mark.slow
+def test_a_lens_that_is_not_the_stated_one_is_named_where_it_is_asked(tmp_path: Path) -> None:
+    others = ["tilt.y", "ground.restitution", "drag", "camera.offset", "camera.missing"]
+    lens = 1 / 1.06 - 1
+    task = make(tmp_path / "lens", {}, json.dumps([*others, "camera.lens"]), lens=lens)
+    closed = gc.close_loop(Task.load(task), tmp_path / "out", budget=1600, pairs=0)
+    assert (closed.verdict.kind, closed.verdict.named) == ("EFFECT", ("camera.lens",))
+    low, middle, high = closed.strengths()["camera.lens"]
+    assert low < lens < high and middle == pytest.approx(lens, abs=0.01)
 
 
 @pytest.mark.slow

@@ -9,7 +9,14 @@ import pytest
 
 import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
-from granulcal.loop.effects.image_faults import KINDS, Frame, blurred, flying, lost, require_image
+from granulcal.loop.effects.image_faults import (
+    KINDS,
+    Frame,
+    blurred,
+    flying,
+    lost,
+    require_image,
+)
 from granulcal.loop.effects.library import FUNNEL, LIBRARY, by_name
 from granulcal.loop.pours.archive import Archive, ArchivePlan
 from granulcal.loop.pours.forward import Forward
@@ -341,6 +348,32 @@ def test_a_camera_beside_the_axis_moves_what_it_sees_and_nothing_else(pour: gc.P
     assert abs(aside["mass_cos_1"] - plain["mass_cos_1"]) > 0.05
     for name in measures.names[: measures.head]:
         assert aside[name] == pytest.approx(plain[name], rel=1e-9, abs=1e-12), name
+
+
+def test_a_lens_that_is_not_the_stated_one_is_what_a_recording_shows(
+    pour: gc.Pour, tmp_path: Path
+) -> None:
+    measures, seen = Measures.of(pour.scene), []
+    for width in (0.3, 0.3 * 1.06):
+        folder = tmp_path / f"{width:g}"
+        camera = gc.Camera.overhead(height=0.3, field_width=width, pixels=300)
+        camera.record(pour.positions, pour.radii, folder)
+        # Told as one that sees 30 cm: what the other one sees is smaller by 1.06.
+        toml = folder / "camera.toml"
+        lines = toml.read_text().splitlines()
+        told = ["fx = 300.0" if x.startswith("fx") else x for x in lines]
+        toml.write_text("\n".join("fy = 300.0" if x.startswith("fy") else x for x in told))
+        seen.append(measures.of_recording(folder / "depth.png", pour.scene, toml))
+    right, wrong = seen
+    plain, faulty = (measures.of_pour(pour, f) for f in ({}, {"lens": 1 / 1.06 - 1}))
+    for name, ratio in (("mean_r", 1 / 1.06), ("max_z", 1.0), ("count_in_view", 1.06**-2)):
+        i = measures.names.index(name)
+        assert faulty[i] / plain[i] == pytest.approx(ratio, rel=0.02), name
+        assert wrong[i] / right[i] == pytest.approx(faulty[i] / plain[i], rel=0.02), name
+    # Where it stands is told in the lengths that are read.
+    frame = Frame.with_faults(pour, {"aside_x": 4e-3, "lens": 0.1}, 0)
+    moved = Frame.of(pour, 0.1).points() - frame.points()
+    np.testing.assert_allclose(moved, np.broadcast_to([4e-3, 0.0, 0.0], moved.shape), atol=1e-15)
 
 
 def test_height_maps_are_not_asked_where_the_axis_was() -> None:

@@ -161,8 +161,12 @@ impl Pour {
         }
     }
 
-    fn observe(&self, py: Python<'_>) -> PyResult<Observation> {
-        let seen = py.detach(|| granulcal_dataset::observe(&self.camera, &self.inner, self.seed));
+    /// What the scene's camera sees, or one whose lens shows so wide a piece of ground [m].
+    #[pyo3(signature = (field_width=None))]
+    fn observe(&self, py: Python<'_>, field_width: Option<f64>) -> PyResult<Observation> {
+        let field_width = field_width.unwrap_or(self.camera.field_width);
+        let camera = CameraSpec { field_width, ..self.camera };
+        let seen = py.detach(|| granulcal_dataset::observe(&camera, &self.inner, self.seed));
         let inner = seen.map_err(error::dataset)?.with_grain_diameter(self.grain_diameter);
         Ok(Observation { inner })
     }

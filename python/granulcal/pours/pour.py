@@ -162,13 +162,16 @@ class Pour:
         turned = body[None] + 2.0 * (w * across + np.cross(axis, across))
         return self.positions[:, None] + turned
 
-    def depth_image(self) -> NDArray[np.float32]:
+    def depth_image(self, field_width: float | None = None) -> NDArray[np.float32]:
         """Returns what the scene's pinhole camera sees: depth [m], 0 is no data, shape (h, w).
+
+        Args:
+            field_width: ground that its image shows in place of the scene's [m]: another lens.
 
         Raises:
             ValueError: the scene's camera is orthographic; it delivers `height_map`.
         """
-        image = self._observation.depth
+        image = self._seen(field_width).depth
         if image is None:
             raise ValueError("the scene's camera is orthographic: ask for height_map()")
         return image
@@ -189,13 +192,16 @@ class Pour:
             raise KeyError(f"this scene has no view {view!r}; views stand in its table `views`")
         return image
 
-    def height_map(self) -> Array:
+    def height_map(self, field_width: float | None = None) -> Array:
         """Returns what the scene's orthographic camera sees: heights [m], shape (h, w).
+
+        Args:
+            field_width: ground that the map shows in place of the scene's [m].
 
         Raises:
             ValueError: the scene's camera is a pinhole; it delivers `depth_image`.
         """
-        heights = self._observation.heights
+        heights = self._seen(field_width).heights
         if heights is None:
             raise ValueError("the scene's camera is a pinhole: ask for depth_image()")
         return heights
@@ -248,6 +254,9 @@ class Pour:
     @cached_property
     def _observation(self) -> _native.Observation:
         return self._native.observe()
+
+    def _seen(self, field_width: float | None) -> _native.Observation:
+        return self._observation if field_width is None else self._native.observe(field_width)
 
     def _repr_html_(self) -> str:
         from granulcal.html import page, picture, seen_from_above

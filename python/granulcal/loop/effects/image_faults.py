@@ -9,7 +9,9 @@ With the heights z over the ground of the pixels of an image, NaN where there is
 - offset: $z' = z + o$ of the pixels that are grain: their heights are told from another plane than
   the ground on which they lie (the pile of velvet), and so is whether they are above the threshold;
 - missing: a share f of the pixels has no data, each by itself;
-- aside: $x' = x - o$, or y, of the pixels' points: the camera stands beside the pour's axis.
+- aside: $x' = x - o$, or y, of the pixels' points: the camera stands beside the pour's axis;
+- lens: $x' = (1 + s) x$, y as well: the focal length is longer by s than the stated one, so that
+  the camera sees as much less of the ground; depths are right. It acts first, on a pour seen anew.
 
 They act in this order; a pixel of z above the scene's threshold is grain. What they stand for and
 their prior ranges: docs/theory/loop.md.
@@ -36,7 +38,7 @@ __all__ = ["KINDS", "Frame", "blurred", "flying", "lost", "require_image"]
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-KINDS = ("blur", "flying", "lost", "offset", "aside_x", "aside_y", "missing")
+KINDS = ("blur", "flying", "lost", "offset", "aside_x", "aside_y", "missing", "lens")
 """What an effect of the image may be, in the order in which they act."""
 
 # The kernel is cut where 6e-5 of its weight is left.
@@ -71,16 +73,22 @@ class Frame:
     aside: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
-    def of(cls, pour: Pour) -> "Frame":
-        """Returns what the scene's camera delivered of a pour, its noise included."""
+    def of(cls, pour: Pour, lens: float = 0.0) -> "Frame":
+        """Returns what the scene's camera delivered of a pour, its noise included.
+
+        Args:
+            pour: what it saw.
+            lens: share by which its focal length was longer than that by which the image is read.
+        """
         scene = pour.scene
         camera = scene.to_dict()["camera"]
+        width = None if lens == 0 else camera["field_width"] / (1 + lens)
         if camera["projection"] == "pinhole":
-            depth = pour.depth_image().astype(np.float64)
+            depth = pour.depth_image(width).astype(np.float64)
             eye = float(camera["height"])
             z = np.where(depth > 0, eye - depth, np.nan)
         else:
-            eye, z = np.inf, pour.height_map()
+            eye, z = np.inf, pour.height_map(width)
         diameter = scene.get("grains.diameter")
         return cls(z, scene.ground_resolution, eye, float(camera["height_threshold"]), diameter)
 
@@ -108,11 +116,19 @@ class Frame:
         aside_x, aside_y = self.aside
         return np.stack([x[kept] - aside_x, y[kept] - aside_y, lifted[kept]], axis=1)
 
+    @classmethod
+    def with_faults(cls, pour: Pour, faults: Mapping[str, float], seed: int) -> "Frame":
+        """Returns the image of a pour with the faults of `faults`, by kind."""
+        return cls.of(pour, faults.get("lens", 0.0)).with_(faults, seed)
+
     def with_(self, faults: Mapping[str, float], seed: int) -> "Frame":
-        """Returns the image with the faults of `faults`, by kind; `seed` is of what is random."""
+        """Returns the image with the faults of `faults`, by kind; `seed` is of what is random.
+
+        That of the lens is none of an image: see `with_faults`.
+        """
         frame = self
         for number, kind in enumerate(KINDS):
-            value = faults.get(kind, 0.0)
+            value = 0.0 if kind == "lens" else faults.get(kind, 0.0)
             if value == 0:
                 continue
             generator = np.random.default_rng([seed, number])

@@ -330,6 +330,15 @@ LIBRARY: tuple[LibraryEffect, ...] = (
         is_two_sided=True,
         doc="the measured series began this much earlier than it says",
     ),
+    # Not among the usual ones: what it does to one formation other grains do as well.
+    LibraryEffect(
+        name="camera.lens",
+        path="image.lens",
+        image="lens",
+        full=0.1,
+        is_two_sided=True,
+        doc="the lens is longer than stated by this share: lengths across the view are too large",
+    ),
     LibraryEffect(
         name="clock.scale",
         family="clock",

@@ -85,7 +85,7 @@ class Measures:
             plain = np.asarray(pour.observed())
             return reread(self.names, plain[None], faults)[0] if faults else plain
         if faults:
-            frame = Frame.of(pour).with_(faults, pour.seed)
+            frame = Frame.with_faults(pour, faults, pour.seed)
             points, spacing = frame.points(), frame.spacing
             found = diagnostic_statistics(
                 points, grain_diameter=frame.diameter, spacing=spacing, pour_axis=(0.0, 0.0)

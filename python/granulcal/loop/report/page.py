@@ -204,7 +204,7 @@ def _pictures(closed: Closed) -> str:
         models["with " + " + ".join(closed.trace.best.effects)] = closed.trace.best
     for label, one in models.items():
         pour, faults = simulate(closed.scene(condition, one), seed=0), closed.faults(one)
-        points = Frame.of(pour).with_(faults, 0).points() if faults else pour.points()
+        points = Frame.with_faults(pour, faults, 0).points() if faults else pour.points()
         clouds[label] = points - np.array([*points[:, :2].mean(axis=0), 0.0])
     return data_uri(formation_figure(clouds, resolution=closed.task.scene.ground_resolution))
 
