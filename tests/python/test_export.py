@@ -443,6 +443,17 @@ def test_mujocos_material_has_the_cones_and_the_ground_of_its_scene(
     assert "grain_ground" in (tmp_path / "material-mujoco.xml").read_text().split("-->")[0]
 
 
+def test_gazebos_material_has_the_ground_on_which_nothing_would_bounce(scene: gc.Scene) -> None:
+    there = Setup.of(
+        gc.Scene.from_toml(f"{scene.to_toml()}\n[ground.material]\nsliding_friction = 0.3\n")
+    )
+    grain, ground = ENGINES["gazebo"].material(there).split("<!-- of the ground:")
+    sdf = ENGINES["gazebo"].scene(there)["pour.sdf"]
+    for text, mu in ((grain, "0.4"), (ground.split("-->")[0], "0.3")):
+        assert text.strip() in sdf and f"<mu>{mu}</mu>" in text
+        assert "<restitution_coefficient>0<" not in text
+
+
 @pytest.mark.parametrize("engine", ["newton", "chrono"])
 def test_a_material_has_the_ground_without_which_the_grains_is_another(
     scene: gc.Scene, engine: str

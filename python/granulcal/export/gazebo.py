@@ -19,6 +19,7 @@ NOTES = (
     "restitution is of the `bounce` element, which not every physics engine of Gazebo honours",
     "torsional friction at walls is half of ours: of two surfaces the smaller coefficient counts",
     "mu and bounce of two surfaces: the smaller, so a wall rougher than the grains is as smooth as they are",
+    "a surface of which nothing is said lets nothing bounce: what lies below the grains is to have that of the ground",
     "round walls are STL meshes of 64 sides",
 )
 UNEQUAL = "the patch of torsional friction is that of the smallest"
@@ -38,16 +39,21 @@ def _surface(of: Contact, lever: float, radius: float) -> str:
 
 
 def material(setup: Setup, young: float | None = None) -> str:
-    """Returns the `surface` element of a grain."""
+    """Returns the `surface` element of a grain, and beside it, for one root, that of the ground."""
     del young
-    return _surface(setup.grains, setup.effective_radius, setup.smallest) + "\n"
+    ground = _surface(setup.ground, setup.smallest, setup.smallest)
+    return f"{_of_grain(setup)}\n<!-- of the ground:\n{ground}\n-->\n"
+
+
+def _of_grain(setup: Setup) -> str:
+    return _surface(setup.grains, setup.effective_radius, setup.smallest)
 
 
 def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
     """Returns the files of a pour: `gz sim pour.sdf`."""
     del young
     radius = setup.smallest
-    surface = material(setup).strip()
+    surface = _of_grain(setup)
     files, models = {}, []
     for body in setup.walls:
         files[f"{body.name}.stl"] = stl(triangles(body.shape), body.name)
