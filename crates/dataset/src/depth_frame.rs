@@ -1,5 +1,8 @@
 //! One depth image in the numbers of its file, whatever the file.
 
+/// The count that is no data, as 0 is: cameras write it where they saturate.
+pub(crate) const SATURATED: u16 = u16::MAX;
+
 /// One depth image, in the numbers of its file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct DepthFrame {
@@ -8,7 +11,7 @@ pub(crate) struct DepthFrame {
     pub(crate) values: Values,
 }
 
-/// Depth row by row; 0, the largest count, and what is not finite are no data.
+/// Depth row by row; 0, [`SATURATED`], and what is not finite are no data.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Values {
     /// Counts of a unit.

@@ -2,7 +2,7 @@
 
 use granulcal_features::DepthImage;
 
-use crate::depth_frame::{DepthFrame, Values};
+use crate::depth_frame::{DepthFrame, SATURATED, Values};
 use crate::fault::Fault;
 
 /// Depth images of one size and kind, summed. Counts are summed as whole numbers, so that the mean
@@ -227,9 +227,9 @@ impl<T: Copy + Default + PartialEq + std::ops::AddAssign> Sums<T> {
     }
 }
 
-/// The count if it is a measurement, else 0: cameras write the largest one for what they do not know, too.
-pub(crate) fn valid_count(count: u16) -> u32 {
-    if count == u16::MAX { 0 } else { u32::from(count) }
+/// The count if it is a measurement, else 0.
+fn valid_count(count: u16) -> u32 {
+    if count == SATURATED { 0 } else { u32::from(count) }
 }
 
 /// The value if it is a measurement, else 0.

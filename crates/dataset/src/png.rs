@@ -6,6 +6,7 @@ use std::path::Path;
 use granulcal_features::{ColourImage, DepthImage};
 use image::{ImageBuffer, ImageFormat, Luma};
 
+use crate::depth_frame::SATURATED;
 use crate::image_file::{self, Unreadable};
 use crate::input::unpack_limit;
 use crate::mean::Mean;
@@ -95,8 +96,7 @@ pub(crate) fn counts(image: &DepthImage, depth_unit: f64) -> Result<Vec<u16>, Da
     let deepest = image.depth.iter().copied().filter(|d| d.is_finite()).fold(0.0, f32::max);
     let most = (f64::from(deepest) / depth_unit).round();
     let got = || format!("{depth_unit} with a farthest depth of {deepest} m");
-    // The largest count is no data.
-    if most >= f64::from(u16::MAX) {
+    if most >= f64::from(SATURATED) {
         return refuse(got(), "large enough that 65534 counts reach the deepest pixel");
     }
     if deepest > 0.0 && most == 0.0 {

@@ -5,6 +5,7 @@ use std::ops::Range;
 use granulcal_features::Intrinsics;
 
 use super::options::ReadOptions;
+use crate::depth_frame::SATURATED;
 use crate::input::Input;
 use crate::{CameraFile, DatasetError, npy};
 
@@ -64,8 +65,7 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Depths, Da
     }
     let window = options.window(&path, count as u64)?;
     let metres = |value: &f64| match unit {
-        // As in an image of counts.
-        Some(_) if *value == f64::from(u16::MAX) => 0.0,
+        Some(_) if *value == f64::from(SATURATED) => 0.0,
         Some(unit) => (value * unit) as f32,
         None => *value as f32,
     };
