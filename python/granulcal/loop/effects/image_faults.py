@@ -38,8 +38,10 @@ __all__ = ["KINDS", "Frame", "blurred", "flying", "lost", "require_image"]
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-KINDS = ("blur", "flying", "lost", "offset", "aside_x", "aside_y", "missing", "lens")
-"""What an effect of the image may be, in the order in which they act."""
+_OF_IMAGE = ("blur", "flying", "lost", "offset", "aside_x", "aside_y", "missing")
+# Each has a stream of random numbers by its place: new ones stand at the end.
+KINDS = (*_OF_IMAGE, "lens")
+"""What an effect of the image may be, in the order in which they act; the lens acts first."""
 
 # The kernel is cut where 6e-5 of its weight is left.
 _TRUNCATE = 4.0
@@ -124,11 +126,11 @@ class Frame:
     def with_(self, faults: Mapping[str, float], seed: int) -> "Frame":
         """Returns the image with the faults of `faults`, by kind; `seed` is of what is random.
 
-        That of the lens is none of an image: see `with_faults`.
+        A lens is none of an image: see `with_faults`.
         """
         frame = self
-        for number, kind in enumerate(KINDS):
-            value = 0.0 if kind == "lens" else faults.get(kind, 0.0)
+        for number, kind in enumerate(_OF_IMAGE):
+            value = faults.get(kind, 0.0)
             if value == 0:
                 continue
             generator = np.random.default_rng([seed, number])
