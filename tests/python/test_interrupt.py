@@ -5,11 +5,13 @@ an end by itself: `train` fits again and again, `calibrate` has a budget that no
 there is no race with the clock. How long the end took is printed; `pytest -s` shows it.
 """
 
+import gc as gc_module
 import os
 import signal
 import subprocess
 import sys
 import time
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -203,6 +205,20 @@ def test_a_second_run_into_the_same_pours_is_refused(
     first = KeptPours(small_scene, small_prior, path, threads=1)
     second = KeptPours(small_scene, small_prior, path, threads=1)
     assert first.rows == second.rows == {}
+
+
+def test_what_holds_pours_is_let_go_when_a_circle_is_collected(tmp_path: Path) -> None:
+    """A file in the circle was collected before what would have closed it, with a warning."""
+    from granulcal.pours.one_run import OneRun
+
+    circle: list[Any] = [OneRun.of(tmp_path / "pours.json")]
+    circle.append(circle)
+    del circle
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        gc_module.collect()
+    assert not said
+    assert OneRun.of(tmp_path / "pours.json") is not None
 
 
 def test_finished_pours_of_an_interrupted_calibration_are_kept(
