@@ -250,12 +250,18 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(metavar="COMMAND", dest="command")
     for word in _WORDS:
         importlib.import_module(f"granulcal.commands.{word}").add(commands)
-    for inner in commands.choices.values():
-        inner.add_argument("-q", "--quiet", action="store_true", help="no progress")
-        inner.add_argument(
-            "-v", "--verbose", action="count", default=0, help="more messages, where there are any"
-        )
+    for command in commands.choices.values():
+        _add_flags(command, quiet=False, verbose=0)
+        for word in _subparsers(command).values():
+            # Where nothing stands behind the word, what stands before it counts.
+            _add_flags(word, quiet=argparse.SUPPRESS, verbose=argparse.SUPPRESS)
     return parser
+
+
+def _add_flags(parser: argparse.ArgumentParser, *, quiet: bool | str, verbose: int | str) -> None:
+    parser.add_argument("-q", "--quiet", action="store_true", default=quiet, help="no progress")
+    says = "more messages, where there are any"
+    parser.add_argument("-v", "--verbose", action="count", default=verbose, help=says)
 
 
 if __name__ == "__main__":

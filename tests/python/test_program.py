@@ -210,6 +210,19 @@ def test_every_command_takes_json_and_says_how_long_it_would_take(
     assert set(found) - has == set(without)
 
 
+def test_words_in_words_take_the_flags_before_and_behind() -> None:
+    """`design spill ... -q` had been refused: the flag had its place between the two words only."""
+    parser = _parser()
+    assert {
+        name for name, each in parsers(parser).items() if "-q" not in each.format_usage()
+    } == set()
+    rest = ["rings", "funnel", "--pile", "0.03", "-o", "plan"]
+    for words in (["design", "-q", *rest], ["design", *rest, "-q"]):
+        assert (parser.parse_args(words).quiet, parser.parse_args(words).verbose) == (True, 0)
+    told = parser.parse_args(["design", *rest, "-vv"])
+    assert (told.quiet, told.verbose) == (False, 2)
+
+
 def test_an_engine_needs_the_python_package(capfd: pytest.CaptureFixture[str]) -> None:
     from granulcal import _native
 
