@@ -122,6 +122,21 @@ def test_a_run_out_file_gives_the_fronts_of_the_scene(scene: gc.Scene, tmp_path:
         gc.Recording.observed(path, scene, width=0.1)
 
 
+def test_a_run_out_file_in_other_units_or_letters_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "run.txt"
+    path.write_bytes("Größe der Front\n0 nan 0 0.05 0 nan 0 nan nan\n".encode("latin-1"))
+    assert RunOut.open(path).front_radius().tolist() == [0.05]
+    cases = {
+        "Front\n0 nan 0 8 0 nan 0 nan 0\n1 nan 0 45 0 nan 0 nan 0": "line 3.* 45: is it in metres",
+        "Front\n0 -0.05 0 0.05 0 nan 0 nan 0": "line 2: .* from 0 to 10 m, got -0.05",
+        "0 nan 0 0.05 0 nan 0 nan 0\n1 nan 0 0.06 0 nan 0 nan 0": "run.txt: line 1 must be names",
+    }
+    for text, match in cases.items():
+        path.write_text(text)
+        with pytest.raises(ValueError, match=match):
+            RunOut.open(path)
+
+
 def run_out(particles: np.ndarray) -> RunOut:
     """Fronts of two cameras at 100 frames a second, the fluid 10 mm ahead."""
     time = 0.01 * np.arange(len(particles)).astype(np.float64)

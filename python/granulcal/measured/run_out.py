@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.documents import ENCODING
 from granulcal.measured.names import observed_of, value_at
 from granulcal.pours.scene import Scene
 from granulcal.pours.statistics import ObservedStatistics
@@ -21,6 +22,8 @@ Array = NDArray[np.float64]
 _COLUMNS = 9
 _PARTICLE_RADII = (3, 7)
 _LIQUID_RADII = (1, 5)
+# No front is farther out than this [m]: it is one in millimetres.
+_FARTHEST = 10.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,11 +61,15 @@ class RunOut:
 
         Raises:
             FileNotFoundError: there is no such file.
-            ValueError: it is no run-out file, or fps is not positive; the message says where.
+            ValueError: it is no run-out file, has radii below 0 or above 10 m, or fps is not
+                positive; the message says where.
         """
         if not (np.isfinite(fps) and fps > 0.0):
             raise ValueError(f"fps must be positive and finite, got {fps}")
-        lines = Path(path).read_text().splitlines()
+        # The names are for people, whatever letters they have.
+        lines = Path(path).read_text(ENCODING, errors="replace").splitlines()
+        if lines and _is_frame(lines[0]):
+            raise ValueError(f"{path}: line 1 must be names, got the numbers of a frame")
         rows = []
         for number, line in enumerate(lines[1:], start=2):
             words = line.split()
@@ -76,6 +83,12 @@ class RunOut:
                 raise ValueError(
                     f"{path}: line {number} must have {_COLUMNS} numbers, got {len(row)}"
                 )
+            for radius in (row[column] for column in (*_LIQUID_RADII, *_PARTICLE_RADII)):
+                if np.isfinite(radius) and not 0.0 <= radius <= _FARTHEST:
+                    raise ValueError(
+                        f"{path}: line {number}: a front's radius must be from 0 to "
+                        f"{_FARTHEST:g} m, got {radius:g}: is it in metres?"
+                    )
             rows.append(row)
         if not rows:
             raise ValueError(f"{path}: at least one frame is needed, got none")
@@ -162,6 +175,15 @@ class RunOut:
                 stacklevel=2,
             )
         return found
+
+
+def _is_frame(line: str) -> bool:
+    """Whether a line is numbers, as many as a frame has."""
+    words = line.split()
+    try:
+        return len([float(word) for word in words]) == _COLUMNS
+    except ValueError:
+        return False
 
 
 def _mean(fronts: Array) -> Array:
