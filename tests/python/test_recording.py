@@ -159,6 +159,12 @@ def test_frames_in_memory_are_what_their_files_are(pour, camera, tmp_path):
         assert read.frames == np.ndim(depth) - 1
         found, expected = read.statistics(), stored.statistics()
         np.testing.assert_allclose(np.asarray(found), np.asarray(expected), rtol=1e-4, atol=1e-6)
+    # What a camera writes where it saturates.
+    blind = counts.copy()
+    blind[len(blind) // 2] = 65535
+    for depth in (blind, blind.astype(np.int32), np.stack([blind, blind]), blind.astype(float)):
+        read = gc.Recording.from_depth(depth, **lens, unit=1e-4)
+        np.testing.assert_array_equal(read.depth == 0, (blind == 65535) | (counts == 0))
     nothing = np.where(stored.depth > 0.37, np.nan, stored.depth)
     assert (gc.Recording.from_depth(nothing, **lens).depth == 0).sum() == (~(nothing > 0)).sum()
     # As readers hand them out: turned by a transposition, with one channel, of another pour.

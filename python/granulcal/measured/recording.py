@@ -51,6 +51,8 @@ Array = NDArray[np.float64]
 
 # Frames that are averaged unless told otherwise: as many as Matl et al. 2020 average.
 FRAMES = 10
+# The count that cameras write where they saturate: no data, as in files of counts.
+_SATURATED = 65535
 
 
 class DamagedRecordingWarning(UserWarning):
@@ -180,8 +182,8 @@ class Recording:
         """Returns the recording of depth images in memory, as a camera's software hands them out.
 
         Args:
-            depth: one image or frames of one, 0 or NaN where there is no data, shape (h, w) or
-                (k, h, w): metres, or counts with their `unit`.
+            depth: one image or frames of one, shape (h, w) or (k, h, w): metres, or counts with
+                their `unit`. 0, NaN, infinities and a count of 65535 are no data.
             fx: focal length along the rows [px].
             fy: the same along the columns [px].
             cx: column of the principal point [px], the centre of the first pixel at (0, 0).
@@ -217,7 +219,10 @@ class Recording:
         is_colour = images.ndim == 3 and images.shape[2] in (3, 4) and images.shape[1] > 4
         if images.ndim != 3 or images.size == 0 or is_colour:
             raise ValueError(f"depth must have shape (h, w) or (k, h, w), got {np.shape(depth)}")
-        metres = images.astype(np.float32) * np.float32(1.0 if unit is None else unit)
+        metres = images.astype(np.float32)
+        if unit is not None:
+            metres *= np.float32(unit)
+            metres[images == _SATURATED] = 0.0
         native = _native.Recording.of_depths(np.ascontiguousarray(metres), (fx, fy, cx, cy), unit)
         if native.unlike is not None:
             warnings.warn(f"depth array: {native.unlike}", UnlikeFramesWarning, stacklevel=2)
