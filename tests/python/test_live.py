@@ -10,7 +10,7 @@ import pytest
 
 import granulcal as gc
 from granulcal.cli import main
-from granulcal.measured.live import RealSense, Ros2, _frame_of, record
+from granulcal.measured.live import RealSense, Ros2, _frame_of, _lens_of, record
 from granulcal.measured.ros_files import DepthFrame, write_bag, write_mcap
 
 pytest.importorskip("rosbags")
@@ -129,6 +129,48 @@ def test_messages_of_ros_become_metres() -> None:
     message.encoding = "rgb8"
     with pytest.raises(ValueError, match="got 'rgb8'"):
         _frame_of(message)
+
+
+def test_the_lens_of_a_topic_is_chosen_as_of_a_file() -> None:
+    k, p = [60.0, 0, 31.5, 0, 61.0, 23.5, 0, 0, 1], [50.0, 0, 30, 0, 0, 51, 22, 0, 0, 0, 1, 0]
+    info = SimpleNamespace(width=64, height=48, d=[0.1, -0.05, 0.0, 0.0, 0.0], k=k, p=p)
+    # Rectified images are of the projection, whatever the lens before them did.
+    projected = {**LENS, "fx": 50.0, "fy": 51.0, "cx": 30.0, "cy": 22.0}
+    assert _lens_of(info, "/cam/depth/image_rect_raw", "/cam/depth/camera_info") == projected
+    with pytest.raises(ValueError, match="of /i must be zero: .* rectified depth, got .0.1"):
+        _lens_of(info, "/rect/image_raw", "/i")
+    info.d = []
+    assert _lens_of(info, "/cam/depth/image_raw", "/i") == LENS
+    info.p = [0.0] * 12
+    assert _lens_of(info, "/cam/depth/image_rect", "/i") == LENS
+
+
+@pytest.mark.parametrize("name", ["live.bag", "live.mcap"])
+def test_saturated_counts_of_a_live_camera_are_no_data(name: str, tmp_path: Path) -> None:
+    counts = np.round(depth(0) / 1e-3).astype("<u2")
+    counts[20:30, 30:40] = 65535
+    message = SimpleNamespace(
+        header=SimpleNamespace(stamp=SimpleNamespace(sec=1, nanosec=0)),
+        encoding="16UC1",
+        is_bigendian=0,
+        width=64,
+        height=48,
+        step=2 * 64,
+        data=counts.tobytes(),
+    )
+    source = Ros2.__new__(Ros2)
+    source.lens, source.depth_unit, source._farthest = LENS, 1e-3, 0.0
+    source._wait = lambda arrived, topic: message
+    source._arrived, source._topic = [], "/depth"
+    assert record(source, tmp_path / name, frames=2) == 2
+    found = gc.Recording.open(tmp_path / name).depth
+    assert found is not None
+    np.testing.assert_array_equal(found == 0, (counts == 65535) | (counts == 0))
+    # A lens of another size would be refused when the grains are gone.
+    source.lens = {**LENS, "width": 32}
+    with pytest.raises(ValueError, match="/depth must be of 32x48 pixels .* got 64x48"):
+        record(source, tmp_path / f"other-{name}", frames=2)
+    assert not (tmp_path / f"other-{name}").exists()
 
 
 def test_metres_of_ros_keep_a_tenth_of_a_millimetre(tmp_path: Path) -> None:

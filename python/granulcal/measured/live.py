@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from granulcal import _native
-from granulcal.measured.ros_files import DepthFrame, write_bag, write_mcap
+from granulcal.measured.ros_files import SATURATED, DepthFrame, write_bag, write_mcap
 
 __all__ = ["RealSense", "Ros2", "Source", "record", "require_recordable"]
 
@@ -82,7 +82,8 @@ class RealSense:
             while True:
                 frame = self._pipeline.wait_for_frames().get_depth_frame()
                 if frame:
-                    depth = np.asanyarray(frame.get_data()).astype(float) * self.depth_unit
+                    counts = np.asanyarray(frame.get_data())
+                    depth = _metres(counts, self.depth_unit)
                     yield DepthFrame(depth, round(frame.get_timestamp() * 1e6))
         finally:
             self._pipeline.stop()
@@ -99,6 +100,7 @@ class Ros2:
     Raises:
         ModuleNotFoundError: rclpy is not installed: source ROS 2's setup first.
         OSError: nothing arrives within five seconds.
+        ValueError: the lens distorts and the topic is not rectified.
     """
 
     def __init__(self, topic: str, info: str | None = None, *, node: Any = None) -> None:
@@ -114,25 +116,31 @@ class Ros2:
         beside = info or f"{topic.rsplit('/', 1)[0]}/camera_info"
         node.create_subscription(Image, topic, self._arrived.append, 10)
         node.create_subscription(CameraInfo, beside, self._infos.append, 10)
-        told = self._wait(self._infos, beside)
-        k = told.k
-        self.lens: dict[str, float] = {
-            "width": told.width, "height": told.height, "fx": k[0], "fy": k[4],
-            "cx": k[2], "cy": k[5],
-        }  # fmt: skip
+        self.lens: dict[str, float] = _lens_of(self._wait(self._infos, beside), topic, beside)
         """Lens [px]."""
         self.depth_unit = _MILLIMETRE
         """Metres per count: of 16UC1 by REP 118; of 32FC1 finer, where what it sees is near."""
         self._farthest = 0.0
 
     def frames(self) -> Iterator[DepthFrame]:
-        """Yields frames as they arrive."""
+        """Yields frames as they arrive.
+
+        Raises:
+            OSError: none arrives within five seconds.
+            ValueError: other pixels than depths, or an image of another size than the lens.
+        """
         while True:
             message = self._wait(self._arrived, self._topic)
+            width, height = self.lens["width"], self.lens["height"]
+            if (message.width, message.height) != (width, height):
+                raise ValueError(
+                    f"{self._topic} must be of {width}x{height} pixels as its camera_info, got "
+                    f"{message.width}x{message.height}: is the lens another's (--camera-topic)?"
+                )
             frame = _frame_of(message)
             if message.encoding == "32FC1":
                 self._farthest = max(self._farthest, float(frame.depth.max(initial=0.0)))
-                is_near = self._farthest <= _FINE * np.iinfo(np.uint16).max
+                is_near = self._farthest <= _FINE * (SATURATED - 1)
                 self.depth_unit = _FINE if is_near else _MILLIMETRE
             yield frame
 
@@ -145,6 +153,27 @@ class Ros2:
         return arrived.pop(0)
 
 
+def _lens_of(info: Any, topic: str, beside: str) -> dict[str, float]:
+    """The lens as it is taken of a file: P of a rectified topic, else K, free of distortion."""
+    words = topic.rsplit("/", 1)[-1].split("_")
+    is_rectified = "rect" in words or "rectified" in words
+    distortion = [float(coefficient) for coefficient in info.d]
+    if not is_rectified and any(distortion):
+        raise ValueError(
+            f"the distortion of {beside} must be zero: record the rectified depth, got {distortion}"
+        )
+    k, p = info.k, info.p
+    fx, fy, cx, cy = (
+        (p[0], p[5], p[2], p[6]) if is_rectified and p[0] > 0 else (k[0], k[4], k[2], k[5])
+    )
+    return {"width": info.width, "height": info.height, "fx": fx, "fy": fy, "cx": cx, "cy": cy}
+
+
+def _metres(counts: np.ndarray, unit: float) -> np.ndarray:
+    """Depths of counts [m], 0 where the camera saturated."""
+    return np.where(counts == SATURATED, 0.0, counts.astype(float) * unit)
+
+
 def _frame_of(message: Any) -> DepthFrame:
     kinds = {"16UC1": ("u2", _MILLIMETRE), "mono16": ("u2", _MILLIMETRE), "32FC1": ("f4", 1.0)}
     if message.encoding not in kinds:
@@ -153,10 +182,10 @@ def _frame_of(message: Any) -> DepthFrame:
     kind = f"{'>' if message.is_bigendian else '<'}{letters}"
     rows = np.frombuffer(bytes(message.data), np.uint8).reshape(message.height, message.step)
     width = message.width * np.dtype(kind).itemsize
-    depth = np.ascontiguousarray(rows[:, :width]).view(kind).astype(float) * unit
+    pixels = np.ascontiguousarray(rows[:, :width]).view(kind)
     stamp = message.header.stamp
     # Infinite is too far, or too near: no data, as NaN.
-    depth = np.nan_to_num(depth, posinf=0.0, neginf=0.0)
+    depth = np.nan_to_num(_metres(pixels, unit), posinf=0.0, neginf=0.0)
     return DepthFrame(depth, stamp.sec * 1_000_000_000 + stamp.nanosec)
 
 

@@ -22,6 +22,7 @@ from granulcal.measured import (
     is_of_named_values,
 )
 from granulcal.measured.formation import EdgePixelsWarning, Formation, Levelled, Plane, plane_of
+from granulcal.measured.ros_files import SATURATED
 from granulcal.measured.segmentation import SegmentationSettings
 from granulcal.pours.camera import Camera
 from granulcal.pours.scene import Scene
@@ -51,8 +52,6 @@ Array = NDArray[np.float64]
 
 # Frames that are averaged unless told otherwise: as many as Matl et al. 2020 average.
 FRAMES = 10
-# The count that cameras write where they saturate: no data, as in files of counts.
-_SATURATED = 65535
 
 
 class DamagedRecordingWarning(UserWarning):
@@ -222,7 +221,7 @@ class Recording:
         metres = images.astype(np.float32)
         if unit is not None:
             metres *= np.float32(unit)
-            metres[images == _SATURATED] = 0.0
+            metres[images == SATURATED] = 0.0
         native = _native.Recording.of_depths(np.ascontiguousarray(metres), (fx, fy, cx, cy), unit)
         if native.unlike is not None:
             warnings.warn(f"depth array: {native.unlike}", UnlikeFramesWarning, stacklevel=2)

@@ -19,7 +19,10 @@ from numpy.typing import NDArray
 from granulcal import _native
 from granulcal.files import replace_file
 
-__all__ = ["DepthFrame", "write_bag", "write_mcap"]
+__all__ = ["SATURATED", "DepthFrame", "write_bag", "write_mcap"]
+
+SATURATED = 65535
+"""The count that cameras write where they saturate: no data."""
 
 Image = NDArray[np.uint16]
 _SENSOR = "/device_0/sensor_0"
@@ -198,9 +201,9 @@ def write_mcap(
 
 def _counts(depth: NDArray[np.floating], unit: float) -> Image:
     counts = np.round(np.asarray(depth, float) / unit)
-    if counts.max(initial=0.0) > np.iinfo(np.uint16).max:
+    if counts.max(initial=0.0) >= SATURATED:
         raise ValueError(
-            f"depth must be at most {np.iinfo(np.uint16).max * unit:g} m at a unit of {unit:g} m, "
+            f"depth must be at most {(SATURATED - 1) * unit:g} m at a unit of {unit:g} m, "
             f"got {np.max(depth):g} m"
         )
     return counts.astype("<u2")
