@@ -1,9 +1,12 @@
 //! The mean of depth images, pixel by pixel over those that have data there.
 
+mod blocks;
+
 use granulcal_features::DepthImage;
 
 use crate::depth_frame::{DepthFrame, SATURATED, Values};
 use crate::fault::Fault;
+use blocks::{Block, count_off};
 
 /// Depth images of one size and kind, summed. Counts are summed as whole numbers, so that the mean
 /// of counts is rounded once.
@@ -31,16 +34,8 @@ struct Unlike {
 const ALONG: usize = 30;
 /// Least side of a block `[px]`.
 const LEAST_SIDE: usize = 4;
-/// Blocks of one view, but for a few, differ by less than so many metres, or robust standard deviations of what all
-/// blocks of the image do: that is the camera's noise, which grows with the square of the depth. Two frames of a D435
-/// at 1.5 m have 2 of 1142 blocks beyond, another pour of 2000 grains at 0.3 m has 125 of 900.
-const OFF: f64 = 1e-3;
-const DEVIATIONS: f64 = 6.0;
+/// So many blocks of an image of the same view may differ.
 const FEW: usize = 4;
-/// Where half of the image is nearer than this `[-]`, or farther, the camera was moved: noise goes both ways.
-const MOVED: f64 = 0.01;
-/// Standard deviations in a median of absolute values.
-const OF_MEDIAN: f64 = 1.4826;
 
 enum State {
     /// Up to one image, as it came: most recordings of one image never need the sums.
@@ -150,28 +145,20 @@ impl Mean {
         let unit = if matches!(values, Values::Counts(_)) { self.unit } else { 1.0 };
         let (enough, metres) =
             (side * side / 2, |sum: f64, known: usize| unit * sum / known as f64);
-        // Depth and difference of each block `[m]`.
-        let known: Vec<(f64, f64)> = blocks
+        let down = self.height.div_ceil(side);
+        let from_middle = |index: usize, count: usize| (index as f64 + 0.5) / count as f64 - 0.5;
+        let known: Vec<Block> = blocks
             .into_iter()
-            .filter(|&(known, ..)| known >= enough)
-            .map(|(known, means, off)| (metres(means, known), metres(off, known)))
+            .enumerate()
+            .filter(|&(_, (known, ..))| known >= enough)
+            .map(|(index, (known, means, off))| {
+                let (depth, off) = (metres(means, known), metres(off, known));
+                let (x, y) =
+                    (from_middle(index % across, across), from_middle(index / across, down));
+                Block { x, y, depth, share: off / depth }
+            })
             .collect();
-        let median = |of: &dyn Fn(f64, f64) -> f64| {
-            let mut values: Vec<f64> = known.iter().map(|&(depth, off)| of(depth, off)).collect();
-            let middle = values.len() / 2;
-            if values.is_empty() {
-                0.0
-            } else {
-                *values.select_nth_unstable_by(middle, f64::total_cmp).1
-            }
-        };
-        if median(&|depth, off| off / depth).abs() > MOVED {
-            return known.iter().filter(|(depth, off)| off.abs() > MOVED * depth).count();
-        }
-        let noise = OF_MEDIAN * median(&|depth, off| off.abs() / (depth * depth));
-        let is_off =
-            |&&(depth, off): &&(f64, f64)| off.abs() > OFF.max(DEVIATIONS * noise * depth * depth);
-        known.iter().filter(is_off).count()
+        count_off(&known)
     }
 
     /// That the images are not of one view, if one is unlike the mean of those before it.
@@ -352,5 +339,35 @@ mod tests {
         assert!(
             doubt(1000.0, 0.2, [40.0, 40.0], 20.0).is_some_and(|text| text.contains("frame 4"))
         );
+    }
+
+    #[test]
+    fn a_camera_that_was_turned_is_known_and_hides_no_other_heap() {
+        let (width, height) = (320, 240);
+        // A floor at 350 mm that slopes by a share of that across the image, in tenths of a millimetre, and a heap.
+        let frame = |slope: f64, heap: f64, seed: usize| {
+            let values = (0..width * height).map(|pixel| {
+                let (u, v) = ((pixel % width) as f64 - 160.0, (pixel / width) as f64 - 120.0);
+                let noise = ((pixel * 7919 + seed * 104_729) % 61) as f64 / 30.0 - 1.0;
+                let height = heap * (1.0 - u.hypot(v) / 60.0).max(0.0);
+                (10.0 * (350.0 * (1.0 + slope * u / 320.0) - height + noise)).round() as u16
+            });
+            DepthFrame { width, height, values: Values::Counts(values.collect()) }
+        };
+        let doubt = |slope, heaps: [f64; 2]| {
+            let mut mean = Mean::new(frame(0.0, heaps[0], 0), 1e-4);
+            (1..4).for_each(|seed| mean.add(&frame(0.0, heaps[0], seed)).unwrap());
+            mean.add(&frame(slope, heaps[1], 9)).unwrap();
+            mean.doubt()
+        };
+        for still in [0.0, 0.005, 0.01] {
+            assert_eq!(doubt(still, [26.0, 26.0]), None, "{still}");
+        }
+        for turned in [0.03, 0.05, 0.1] {
+            assert!(doubt(turned, [26.0, 26.0]).is_some(), "{turned}");
+            // It had been all noise, of which another heap is no more than a part.
+            assert!(doubt(turned, [0.0, 26.0]).is_some(), "{turned}");
+        }
+        assert!(doubt(0.01, [20.0, 26.0]).is_some());
     }
 }
