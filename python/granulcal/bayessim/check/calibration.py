@@ -200,8 +200,8 @@ class Calibration:
                 f"(chance allows {count.low}..{count.high})"
             )
         shown = ", ".join(
-            f"{name.rsplit('.', 1)[-1]} {p:.2g}"
-            for name, p in zip(self.names, self.ranks.p_values, strict=True)
+            f"{name} {p:.2g}"
+            for name, p in zip(short_names(self.names), self.ranks.p_values, strict=True)
         )
         lines.append(f"  p-values: ranks {shown}; TARP {self.tarp.p_value:.2g}")
         if self.failures:

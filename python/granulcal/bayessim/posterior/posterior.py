@@ -27,6 +27,7 @@ from granulcal.bayessim.posterior.marginal import CredibleRegion, Marginal, kern
 from granulcal.one_thread import one_thread
 from granulcal.prior import Prior
 from granulcal.real import check_real
+from granulcal.short_names import short_names
 from granulcal.whole import check_seed, check_whole
 
 if TYPE_CHECKING:
@@ -331,9 +332,10 @@ class Posterior:
 
         def draw(figure: Any) -> None:
             panels = figure.subplots(1, len(self.names), squeeze=False)[0]
-            for axes, marginal in zip(panels, self.marginals().values(), strict=True):
+            short, marginals = short_names(self.names), self.marginals().values()
+            for axes, name, marginal in zip(panels, short, marginals, strict=True):
                 axes.fill_between(marginal.grid, marginal.density, alpha=0.4)
-                axes.set_xlabel(marginal.name.rpartition(".")[2])
+                axes.set_xlabel(name)
                 axes.set_yticks([])
 
         drawn = picture(draw, width=2.6 * len(self.names), height=2.2)

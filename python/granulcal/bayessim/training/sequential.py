@@ -36,6 +36,7 @@ from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.one_thread import one_thread
 from granulcal.pours.left_out import LeftOut
 from granulcal.prior import Prior
+from granulcal.short_names import short_names
 from granulcal.whole import check_whole
 
 __all__ = ["Round", "SequentialFit", "infer_within_budget", "round_sizes", "rounds_of"]
@@ -73,7 +74,7 @@ class Round:
 
     def __str__(self) -> str:
         """One line."""
-        words = [name.rpartition(".")[2] for name in self.names] or [""] * len(self.spread)
+        words = short_names(self.names) or [""] * len(self.spread)
         each = zip(words, self.spread, strict=True)
         spread = ", ".join(f"{word} {share:.2f}".strip() for word, share in each)
         return (
