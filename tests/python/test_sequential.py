@@ -41,6 +41,7 @@ def test_a_budget_is_spent_where_the_posterior_is(toy):
     found = infer_within_budget(simulate, toy.prior, x[0], budget=100, progress=seen.append)
     assert [first for first, _ in asked] == [0, 40, 60, 80] and len(found.x) == 100
     assert seen == list(found.rounds) and seen[-1].usable == 90
+    assert found.left_out.total == found.left_out.unseen == 10
     distance = [np.linalg.norm(at - theta, axis=1).mean() for _, at in asked]
     assert distance[-1] < 0.7 * distance[0]
     exact = toy.posterior(x[0])
@@ -58,6 +59,11 @@ def test_budgets_and_observations_are_checked(toy):
     x = toy.simulate(1)[1][0]
     with pytest.raises(ObservationError, match="finite"):
         infer_within_budget(lambda at, first: at, toy.prior, x * np.nan)
+    with pytest.raises(ValueError, match="masked"):
+        hidden = np.ma.masked_greater(x, x.min())
+        infer_within_budget(lambda at, first: at, toy.prior, hidden)
+    with pytest.raises(TypeError, match=r"prior must be a Prior, .*'prior\.toml'"):
+        infer_within_budget(lambda at, first: at, cast(Any, "prior.toml"), x)
     with pytest.raises(TrainingDataError, match="0 of 40"):
         infer_within_budget(lambda at, first: np.full((len(at), 16), np.nan), toy.prior, x)
 

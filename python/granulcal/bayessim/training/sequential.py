@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from granulcal.bayessim.arrays import as_matrix
+from granulcal.bayessim.arrays import as_matrix, as_real
 from granulcal.bayessim.check.misfit import Misfit
 from granulcal.bayessim.emulator.likelihood import EmulatorChoice
 from granulcal.bayessim.named import by_name
@@ -35,7 +35,7 @@ from granulcal.bayessim.training.round_fit import RoundFit, first_design
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.one_thread import one_thread
 from granulcal.pours.left_out import LeftOut
-from granulcal.prior import Prior
+from granulcal.prior import Prior, require_prior
 from granulcal.short_names import short_names
 from granulcal.whole import check_whole
 
@@ -149,9 +149,11 @@ def infer_within_budget(
     Raises:
         ObservationError: an observation that is not finite, or has other names.
         TrainingDataError: fewer than 20 pours of the first round can be used.
-        TypeError: not a whole number.
-        ValueError: a budget below 60.
+        TypeError: a budget that is no whole number, an observation that is no numbers, or a prior
+            that is none.
+        ValueError: a budget below 60, or a masked observation.
     """
+    require_prior(prior)
 
     def pour(design: Array, first: int) -> tuple[Array, Array]:
         return design, as_matrix(
@@ -188,7 +190,7 @@ def rounds_of(
     sizes = round_sizes(budget)
     if x_names is not None:
         x_obs = by_name("x_obs", x_obs, x_names, whose="x_names", error=ObservationError)
-    observed = np.atleast_2d(np.asarray(x_obs, dtype=float))
+    observed = np.atleast_2d(as_real("x_obs", x_obs))
     if observed.ndim != 2 or not np.all(np.isfinite(observed)):
         raise ObservationError(f"x_obs must be finite, shape (s,) or (k, s), got {observed.shape}")
     names = x_names or tuple(f"statistic_{i}" for i in range(observed.shape[1]))
@@ -224,4 +226,6 @@ def rounds_of(
     z = fit.standardiser.apply(observed, clip=False)
     misfit = fit.reference().test(fit.likelihood, z, names)
     theta = prior.from_unconstrained(u)
-    return SequentialFit(fit.posterior, misfit, fit.choice, theta, x, tuple(rounds))
+    # Of a simulator that says nothing but a row of NaN; who knows more puts it in its place.
+    left_out = LeftOut(unseen=len(x) - rounds[-1].usable)
+    return SequentialFit(fit.posterior, misfit, fit.choice, theta, x, tuple(rounds), left_out)
