@@ -94,6 +94,9 @@ def test_what_does_not_go_with_the_model_is_named(model, scene, tmp_path, capfd)
         (str(part),): "part.csv has no value of front_radius[0.05]",
         (file, file): "given once",
         (file, "--border", "2"): "--border is of depth images",
+        (file, "--samples", "5"): "--samples goes with --json",
+        (file, "--samples", "-5", "--json"): "--samples must be at least 0, got -5",
+        (file, "--scene", "drop"): "the model was trained on another scene",
         (str(image),): "must be one of .bmp, .png, .txt, .csv, .json",
     }
     for words, match in cases.items():

@@ -113,11 +113,12 @@ def run(options: argparse.Namespace, folder: Path, document: dict[str, Any]) -> 
     from granulcal.bayessim.check.identifiability import Identifiability
     from granulcal.calibrate import require_same_scene
 
+    _require_samples(options)
     # Before PyTorch is loaded.
     observed = read_measured(options, document)
     model = BayesSim.load(folder)
     if options.scene is not None:
-        require_same_scene(model, Scene.load(options.scene))
+        require_same_scene(model, Scene.named(options.scene))
     misfit, posterior = model.misfit(observed), model.posterior(observed)
     known = Identifiability.of(posterior)
     found = {
@@ -212,6 +213,16 @@ def _require_different(paths: Sequence[Path]) -> None:
     for path, place in zip(paths, there, strict=True):
         if there.count(place) > 1:
             raise ValueError(f"each recording must be given once, got {path} twice")
+
+
+def _require_samples(options: argparse.Namespace) -> None:
+    """Refuses draws that are asked for and printed nowhere, and fewer than none."""
+    if options.samples is None:
+        return
+    if options.samples < 0:
+        raise ValueError(f"--samples must be at least 0, got {options.samples}")
+    if not options.json:
+        raise ValueError("--samples goes with --json, which prints them; --out keeps 1000")
 
 
 def _samples(posterior: Any, count: int, seed: int) -> list[list[float]]:

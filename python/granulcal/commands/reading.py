@@ -30,7 +30,9 @@ def add_recordings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=READS, help="folder of `train`, or a scene of `model`")
     add_reading(parser)
     parser.add_argument(
-        "--scene", type=READS, help="refuse a model of another scene than this TOML"
+        "--scene",
+        type=READS,
+        help="refuse a model of another scene than this TOML, or the word funnel or drop",
     )
 
 
@@ -89,7 +91,7 @@ def open_model(options: argparse.Namespace, *, of_images: bool = True) -> Any:
     if of_images:
         require_own_statistics(model)
     if options.scene is not None:
-        require_same_scene(model, Scene.load(options.scene))
+        require_same_scene(model, Scene.named(options.scene))
     return model
 
 
