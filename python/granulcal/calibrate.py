@@ -81,7 +81,8 @@ def require_own_statistics(model: "BayesSim") -> None:
     if tuple(model.x_names) != tuple(NAMES):
         raise ValueError(
             f"the model must be of the {len(NAMES)} statistics of an image, in order; it is of "
-            f"{', '.join(model.x_names)}: `granulcal infer` and `report` take tables of these"
+            f"{', '.join(model.x_names)}: `granulcal infer` takes recordings of some of the "
+            f"{len(NAMES)}, and with `report` tables of what a scene observes"
         )
 
 

@@ -257,6 +257,36 @@ def test_what_a_check_says_of_other_pours_is_of_them(
     assert told[1]["identifiability"] == known.as_dict() and told[1]["gain_nat"] == found.gain
 
 
+def test_a_model_of_some_statistics_of_an_image_is_checked_and_drawn(
+    model, small_data, small_scene, recording, tmp_path, capfd
+):
+    """The check had been refused, and the plot after the posterior."""
+    places, folder, plot = [3, 1, 0], tmp_path / "some", tmp_path / "pair.png"
+    names = [small_data.x_names[place] for place in places]
+    made = BayesSim.fit(
+        small_data.theta, small_data.x[:, places], small_data.prior, x_names=names,
+        scene=small_scene, quiet=True, method="emulated",
+    )  # fmt: skip
+    made.save(folder)
+    words = ["infer", str(folder), recording[0], "--camera", recording[1]]
+    assert main([*words, "--plot", str(plot)]) in (0, 3)
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    other = tmp_path / "other"
+    data = gc.generate(small_scene, small_data.prior, 30, seed=77, out=other, progress=False)
+    capfd.readouterr()
+    assert main(["check", str(folder), "--data", str(other), "--json"]) in (0, 3)
+    told = json.loads(capfd.readouterr().out)
+    assert told["gain_nat"] == made.examine(data.theta, data.x[:, places])[0].gain
+    observed = tmp_path / "observed"
+    observe = "\n[observe]\nrate = 100.0\n\n[observe.radius]\npercentiles = [50.0]\n"
+    radii = gc.Scene.from_toml(small_scene.to_toml() + observe)
+    gc.generate(radii, small_data.prior, 2, seed=7, out=observed, progress=False)
+    made.scene_toml = None
+    made.save(folder)
+    assert main(["check", str(folder), "--data", str(observed)]) == 2
+    assert "has no max_r, mean_z, max_z, which the model is of" in capfd.readouterr().err
+
+
 def test_pours_of_another_prior_are_refused_with_what_differs(
     model, small_data, small_scene, tmp_path, capfd
 ):

@@ -85,11 +85,20 @@ def _pairs(options: argparse.Namespace, model: "BayesSim") -> "TrainingPairs":
     _require_same_prior(options, data.prior, model.prior)
     if model.scene_toml is not None:
         require_same_scene(model, data.scene)
-    pairs = TrainingPairs.gather(data, prior=model.prior, fewest=FEWEST_TO_CHECK)
-    if pairs.x_names != model.x_names:
+    if lacking := [name for name in model.x_names if name not in data.x_names]:
         raise ValueError(
-            f"{options.data} has the statistics {pairs.x_names}, the model {model.x_names}"
+            f"{options.data} has no {', '.join(lacking)}, which the model is of; it has "
+            f"{', '.join(data.x_names)}"
         )
+    # The model may be of some of them.
+    pairs = TrainingPairs.gather(
+        dict(zip(data.theta_names, data.theta.T, strict=True)),
+        data.x[:, [data.x_names.index(name) for name in model.x_names]],
+        prior=model.prior,
+        status=data.status.tolist(),
+        x_names=model.x_names,
+        fewest=FEWEST_TO_CHECK,
+    )
     training = model_named(options.model) / TRAINING
     if training.exists():
         seen = Dataset.load(training)

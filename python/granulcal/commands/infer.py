@@ -94,7 +94,8 @@ def _plot(options: argparse.Namespace, code: int) -> None:
     from granulcal.measured.plausible import violations
     from granulcal.pours.scene import Scene
 
-    model = open_model(options)
+    # Which statistics it may be of, `infer` has said.
+    model = open_model(options, of_images=False)
     with contextlib.redirect_stderr(io.StringIO()):
         # What is lost of the recordings is told already.
         recordings = open_recordings(options)
