@@ -169,6 +169,20 @@ def test_few_pairs_of_the_prior_do_not_choose_a_network():
     assert any("worth" in note for note in model.summary.notes)
 
 
+@pytest.mark.parametrize(("own", "here"), [([0.25], "at 0.25"), ([], "nowhere")])
+def test_a_proposal_of_another_fixed_number_is_refused(own, here):
+    """The posterior had been told under the prior's number, which no pair was of."""
+    theta, x = BOUNDED.simulate(80, seed=5)
+
+    def with_fixed(values):
+        more = [Parameter(path="c.d", distribution="fixed", value=value) for value in values]
+        return Prior([*BOUNDED.prior.parameters, *more])
+
+    message = f"proposal fixes c.d at 0.5, the prior {here}"
+    with pytest.raises(TrainingDataError, match=message):
+        BayesSim.fit(theta, x, with_fixed(own), proposal=with_fixed([0.5]), **QUICK)
+
+
 def test_a_proposal_that_leaves_a_part_of_the_prior_out_is_refused():
     """Its weights are all the same: the narrower posterior passed for the prior's and its check."""
     first = BOUNDED.prior.free[0]

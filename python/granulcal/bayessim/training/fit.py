@@ -348,8 +348,8 @@ def importance_weights(pairs: TrainingPairs, proposal: Prior | None) -> Array | 
     """Returns p(theta) / proposal(theta) of each pair over their mean, shape (n,).
 
     Raises:
-        TrainingDataError: the proposal has other parameters, cannot have made the pairs, or has
-            none where more than a hundredth of the prior is.
+        TrainingDataError: the proposal has other parameters, fixes one elsewhere, cannot have made
+            the pairs, or has none where more than a hundredth of the prior is.
     """
     if proposal is None:
         return None
@@ -357,6 +357,7 @@ def importance_weights(pairs: TrainingPairs, proposal: Prior | None) -> Array | 
         raise TrainingDataError(
             f"proposal must have the prior's parameters {pairs.prior.names}, got {proposal.names}"
         )
+    _require_same_fixed(pairs.prior, proposal)
     _require_covered(pairs.prior, proposal)
     log_weights = pairs.prior.log_prob(pairs.theta) - proposal.log_prob(pairs.theta)
     if not np.all(np.isfinite(log_weights)):
@@ -364,6 +365,16 @@ def importance_weights(pairs: TrainingPairs, proposal: Prior | None) -> Array | 
         raise TrainingDataError(f"{count} rows of theta are outside the proposal's bounds")
     weights = np.exp(log_weights - log_weights.max())
     return weights / weights.mean()
+
+
+def _require_same_fixed(prior: Prior, proposal: Prior) -> None:
+    """Refuses pairs of another material than the prior's: no weight makes them its own."""
+    for name, value in proposal.fixed.items():
+        if prior.fixed.get(name) != value:
+            here = f"at {prior.fixed[name]}" if name in prior.fixed else "nowhere"
+            raise TrainingDataError(
+                f"proposal fixes {name} at {value}, the prior {here}: the pairs are of that value"
+            )
 
 
 def _require_covered(prior: Prior, proposal: Prior) -> None:
