@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+from granulcal.digits import told_apart
+
 if TYPE_CHECKING:
     from granulcal.bayessim.posterior.posterior import Posterior
 
@@ -21,5 +23,6 @@ def print_parameters(parameters: dict[str, Any]) -> None:
     """Prints what `parameters_of` returns as a table."""
     print(f"{'parameter':<30}{'mode':>10}{'mean':>10}   90 % interval")
     for name, values in parameters.items():
-        low, high = values["interval90"]
-        print(f"{name:<30}{values['mode']:>10.4g}{values['mean']:>10.4g}   {low:.4g} to {high:.4g}")
+        numbers = [values["mode"], values["mean"], *values["interval90"]]
+        mode, mean, low, high = told_apart(numbers, least=4)
+        print(f"{name:<30} {mode:>9} {mean:>9}   {low} to {high}")

@@ -24,6 +24,7 @@ from granulcal.bayessim.posterior.doubts import (
     doubts_of,
 )
 from granulcal.bayessim.posterior.marginal import CredibleRegion, Marginal, kernel_density
+from granulcal.digits import told_apart
 from granulcal.one_thread import one_thread
 from granulcal.prior import Prior
 from granulcal.real import check_real
@@ -305,15 +306,20 @@ class Posterior:
         return arviz.from_dict(groups)
 
     def __repr__(self) -> str:
-        region, mode = self.credible_region(0.9), self.mode()
-        told = (
-            f"{name} {mode[i]:.3g} ({region[name][0]:.3g} to {region[name][1]:.3g})"
-            for i, name in enumerate(self.names)
-        )
+        told = (f"{name} {numbers}" for name, numbers in self._in_words().items())
         kinds = dict.fromkeys(type(each).__name__ for each in self.warnings)
         count, plural = len(self.warnings), "s" * (len(self.warnings) > 1)
         noted = f"; {count} note{plural} in `warnings`: {', '.join(kinds)}" if count else ""
         return f"Posterior({', '.join(told)}; mode and 90 % interval{noted})"
+
+    def _in_words(self) -> dict[str, str]:
+        """Mode and 90 % interval of each parameter, by its name."""
+        region, mode = self.credible_region(0.9), self.mode()
+        found = {}
+        for i, name in enumerate(self.names):
+            best, low, high = told_apart([float(mode[i]), *region[name]], least=3)
+            found[name] = f"{best} ({low} to {high})"
+        return found
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(
@@ -323,11 +329,7 @@ class Posterior:
     def _repr_html_(self) -> str:
         from granulcal.html import page, picture
 
-        region, mode = self.credible_region(0.9), self.mode()
-        rows = {
-            name: f"{mode[i]:.3g} ({region[name][0]:.3g} to {region[name][1]:.3g})"
-            for i, name in enumerate(self.names)
-        }
+        rows = self._in_words()
         rows |= {f"note {i}": str(warning) for i, warning in enumerate(self.warnings, start=1)}
 
         def draw(figure: Any) -> None:
