@@ -18,6 +18,7 @@ from granulcal.errors import (  # noqa: E402
     TrainingDataError,
 )
 from granulcal.parameter import Parameter  # noqa: E402
+from granulcal.pours.scene import Scene  # noqa: E402
 from granulcal.prior import Prior  # noqa: E402
 
 BOUNDED = LinearGaussian.random(seed=1, noise=2.0, bounded=True)
@@ -181,6 +182,18 @@ def test_a_proposal_of_another_fixed_number_is_refused(own, here):
     message = f"proposal fixes c.d at 0.5, the prior {here}"
     with pytest.raises(TrainingDataError, match=message):
         BayesSim.fit(theta, x, with_fixed(own), proposal=with_fixed([0.5]), **QUICK)
+
+
+def test_a_prior_that_fixes_a_number_elsewhere_than_the_scene_of_a_proposal_is_refused():
+    """The pairs are of the scene's number, for the proposal names none."""
+    theta, x = BOUNDED.simulate(80, seed=5)
+    scene, path = Scene.drop(0.02, count=60), "material.restitution"
+    fixed = Parameter(path=path, distribution="fixed", value=0.25)
+    prior = Prior([*BOUNDED.prior.parameters, fixed])
+    message = "fixes material.restitution at 0.25, .*: the pairs are of the scene's 0.5"
+    with pytest.raises(TrainingDataError, match=message):
+        BayesSim.fit(theta, x, prior, proposal=BOUNDED.prior, scene=scene, **QUICK)
+    BayesSim.fit(theta, x, prior, proposal=BOUNDED.prior, scene=scene.with_({path: 0.25}), **QUICK)
 
 
 def test_a_proposal_that_leaves_a_part_of_the_prior_out_is_refused():

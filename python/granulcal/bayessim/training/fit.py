@@ -20,6 +20,7 @@ from granulcal.bayessim.training.config import Config
 from granulcal.bayessim.training.pairs import TrainingPairs
 from granulcal.bayessim.training.summary import TrainingSummary
 from granulcal.errors import TrainingDataError
+from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
 __all__ = ["Trained", "told_not_of_prior", "train_model"]
@@ -357,7 +358,7 @@ def importance_weights(pairs: TrainingPairs, proposal: Prior | None) -> Array | 
         raise TrainingDataError(
             f"proposal must have the prior's parameters {pairs.prior.names}, got {proposal.names}"
         )
-    _require_same_fixed(pairs.prior, proposal)
+    _require_same_fixed(pairs, proposal)
     _require_covered(pairs.prior, proposal)
     log_weights = pairs.prior.log_prob(pairs.theta) - proposal.log_prob(pairs.theta)
     if not np.all(np.isfinite(log_weights)):
@@ -367,13 +368,24 @@ def importance_weights(pairs: TrainingPairs, proposal: Prior | None) -> Array | 
     return weights / weights.mean()
 
 
-def _require_same_fixed(prior: Prior, proposal: Prior) -> None:
+def _require_same_fixed(pairs: TrainingPairs, proposal: Prior) -> None:
     """Refuses pairs of another material than the prior's: no weight makes them its own."""
+    own = pairs.prior.fixed
     for name, value in proposal.fixed.items():
-        if prior.fixed.get(name) != value:
-            here = f"at {prior.fixed[name]}" if name in prior.fixed else "nowhere"
+        if own.get(name) != value:
+            here = f"at {own[name]}" if name in own else "nowhere"
             raise TrainingDataError(
                 f"proposal fixes {name} at {value}, the prior {here}: the pairs are of that value"
+            )
+    if pairs.scene_toml is None:
+        return
+    # What a proposal does not name is the scene's.
+    scene = Scene.from_toml(pairs.scene_toml)
+    for name, value in own.items():
+        if name not in proposal.fixed and scene.has(name) and scene.get(name) != value:
+            raise TrainingDataError(
+                f"the prior fixes {name} at {value}, the proposal nowhere: the pairs are of the "
+                f"scene's {scene.get(name)}"
             )
 
 
