@@ -267,6 +267,7 @@ def test_numbers_measured_by_other_means_have_their_names(scene: gc.Scene, tmp_p
     cases = {
         "spiled,3": "'spiled' is no statistic of the scene .is it spilled",
         "spilled,many": "line 2 must be a name and a number",
+        "spilled,23_5": "line 2 must be a name and a number",
         "spilled,nan": "line 2 must be a finite number",
         "spilled,1;spilled,2": "line 3: spilled stands there twice",
         "": "has no statistic",
@@ -325,6 +326,19 @@ def test_a_drum_picture_gives_its_surface(scene: gc.Scene, tmp_path: Path) -> No
         RunOut(time=np.zeros(1), particles=np.zeros((1, 2)), liquid=np.zeros((1, 2))).observed(
             gc.Scene.drop(0.02)
         )
+
+
+def test_what_surrounds_a_drum_in_its_picture_counts_for_nothing(scene: gc.Scene) -> None:
+    pixels, width = 200, 0.04
+    centre = (np.arange(pixels) + 0.5) * width / pixels - 0.5 * width
+    x, z = np.meshgrid(centre, -centre)
+    grains = np.where(z < 0.003 - 0.3 * x, 20.0, 250.0)
+    surfaces = []
+    for around in (250.0, 0.0):
+        grey = np.where(np.hypot(x, z) < 0.5 * width, grains, around)
+        surfaces.append(DrumImage(grey=grey, width=width).observed(scene))
+    assert surfaces[0]["surface_slope"] == pytest.approx(np.degrees(np.arctan(0.3)), abs=0.5)
+    assert surfaces[1] == pytest.approx(surfaces[0], nan_ok=True)
 
 
 def test_measured_kinds_that_nobody_knows_are_refused(scene: gc.Scene, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from granulcal import _native
 from granulcal.measured.names import observed_of, value_at
-from granulcal.measured.table import rows_of
+from granulcal.measured.table import number_in, rows_of
 from granulcal.pours.scene import Scene
 from granulcal.pours.statistics import ObservedStatistics
 
@@ -61,7 +61,7 @@ class DischargeCurve:
                 continue
             try:
                 name, time, percent = row
-                point = float(time), float(percent), number
+                point = number_in(time), number_in(percent), number
             except ValueError:
                 message = f"{path}: line {number} must be a name and two numbers, got {row}"
                 raise ValueError(message) from None

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 # The drum's rim is a dark line about two pixels wide; it is left out.
 _RIM_PIXELS = 3
-# Grey values of grains and of air: these percentiles of the picture.
+# Grey values of grains and of air: these percentiles of the drum, whatever surrounds it.
 _DARK_PERCENTILE, _LIGHT_PERCENTILE = 5.0, 75.0
 # Columns of the slope's line over its width, as in a simulated profile.
 _SLOPE_COLUMNS = 41
@@ -80,7 +80,11 @@ class DrumImage:
         return made
 
     def _levels(self) -> tuple[float, float]:
-        dark, light = np.percentile(self.grey, (_DARK_PERCENTILE, _LIGHT_PERCENTILE))
+        rows, columns = self.grey.shape
+        y, x = np.ogrid[:rows, :columns]
+        off = np.hypot(y + 0.5 - 0.5 * rows, x + 0.5 - 0.5 * columns)
+        drum = self.grey[off < 0.5 * columns - _RIM_PIXELS]
+        dark, light = np.percentile(drum, (_DARK_PERCENTILE, _LIGHT_PERCENTILE))
         return float(dark), float(light)
 
     def surface(self, level: float = 0.5) -> tuple[Array, Array]:

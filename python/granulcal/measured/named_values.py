@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from granulcal.documents import Mapping, Maybe, Number, Table, meant, read_json
-from granulcal.measured.table import rows_of
+from granulcal.measured.table import number_in, rows_of
 from granulcal.pours.scene import Scene
 from granulcal.pours.statistics import ObservedStatistics
 
@@ -101,7 +101,7 @@ def _words(row: list[str]) -> list[str]:
 def _statistic(row: list[str], where: str) -> tuple[str, float]:
     try:
         name, text = row
-        value = float(text)
+        value = number_in(text)
     except ValueError:
         raise ValueError(f"{where} must be a name and a number, got {row}") from None
     if not np.isfinite(value):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from granulcal.documents import ENCODING
 from granulcal.measured.names import observed_of, value_at
+from granulcal.measured.table import number_in
 from granulcal.pours.scene import Scene
 from granulcal.pours.statistics import ObservedStatistics
 
@@ -76,7 +77,7 @@ class RunOut:
             if not words:
                 continue
             try:
-                row = [float(word) for word in words]
+                row = [number_in(word) for word in words]
             except ValueError:
                 raise ValueError(f"{path}: line {number} must be numbers, got {line!r}") from None
             if len(row) != _COLUMNS:
@@ -181,7 +182,7 @@ def _is_frame(line: str) -> bool:
     """Whether a line is numbers, as many as a frame has."""
     words = line.split()
     try:
-        return len([float(word) for word in words]) == _COLUMNS
+        return len([number_in(word) for word in words]) == _COLUMNS
     except ValueError:
         return False
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from granulcal.documents import ENCODING
 
-__all__ = ["rows_of"]
+__all__ = ["number_in", "rows_of"]
 
 
 def rows_of(path: str | PathLike[str]) -> Iterator[list[str]]:
@@ -22,3 +22,14 @@ def rows_of(path: str | PathLike[str]) -> Iterator[list[str]]:
             yield from csv.reader(file)
         except csv.Error as error:
             raise ValueError(f"{path} is no table: {error}") from None
+
+
+def number_in(text: str) -> float:
+    """Returns the number that a cell holds.
+
+    Raises:
+        ValueError: it holds none; `23_5`, a literal of Python, is none either.
+    """
+    if "_" in text:
+        raise ValueError(f"no number: {text!r}")
+    return float(text)
