@@ -12,6 +12,7 @@ use granulcal_scene::{Mask, Prior, Projection, Scene};
 mod bare;
 mod doubts;
 mod frames;
+mod relief;
 mod size;
 
 use crate::{DatasetError, Room};

@@ -266,3 +266,42 @@ fn frames_of_one_pour_are_told_from_pours() {
     let fine = Limits { diameter: 5e-4, ..limits };
     assert!(fine.places_of(&scattered(1, 1e-4)).is_none());
 }
+
+/// A number in `[-1/2, 1/2]` for each pixel or grain and each salt.
+fn chance(number: usize, salt: u64) -> f64 {
+    let mixed = granulcal_numbers::mix(number as u64, salt, 0);
+    (mixed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+}
+
+/// A heap of grains that lie at different heights, those of `pour`, with noise of a frame and a pattern of the camera,
+/// both in each pixel by itself and as standard deviation `[m]`.
+fn heap(pour: u64, (frame, noise): (u64, f64), pattern: f64) -> Recording {
+    let (side, step) = (120, 2e-3);
+    let height = |pixel: usize| {
+        let (u, v) = (pixel % side, pixel / side);
+        let off = step * (u as f64 - 60.0).hypot(v as f64 - 60.0);
+        let top = 0.04 * (1.0 - off / 0.08);
+        let grain = 4e-3 * chance(u / 2 + side * (v / 2), pour);
+        let flat = 12_f64.sqrt();
+        let seen = flat * (noise * chance(pixel, 100 + frame) + pattern * chance(pixel, 99));
+        seen + if top > 0.0 { top + grain } else { 0.0 }
+    };
+    let z = (0..side * side).map(height).collect();
+    let map = HeightMap::new(side, side, step, step, z).unwrap();
+    Recording::of_one("map.npz".into(), Source::Heights(map), Segmentation::default())
+}
+
+#[test]
+fn a_heaps_relief_is_known_under_noise() {
+    let limits = funnel();
+    let told = |recordings: [Recording; 2]| {
+        let places = recordings.map(|each| limits.places_of(&each));
+        !limits.doubts_of_frames(&["a".into(), "b".into()], &places).is_empty()
+    };
+    for noise in [1e-4, 3e-4, 6e-4] {
+        assert!(told([heap(1, (1, noise), 0.0), heap(1, (2, noise), 0.0)]), "{noise}");
+        assert!(!told([heap(1, (1, noise), 0.0), heap(2, (2, noise), 0.0)]), "{noise}");
+    }
+    // A pattern that is the same in all images of a camera is no relief of grains.
+    assert!(!told([heap(1, (1, 2e-4), 2e-3), heap(2, (2, 2e-4), 2e-3)]));
+}
