@@ -73,10 +73,10 @@ def calibrate_within(
 
     Warns:
         DoubtfulRecordingWarning: what `Recording.doubts` says, recordings that are frames of one
-            pour, or a funnel above the camera.
+            pour, or grains let go above the camera.
     """
     from granulcal.bayessim.training.sequential import round_sizes
-    from granulcal.loop.recorded import doubt_of_funnel
+    from granulcal.loop.recorded import doubt_of_start
 
     require_scene(scene)
     require_prior(prior)
@@ -85,7 +85,7 @@ def calibrate_within(
     round_sizes(budget)
     _require_fits(prior, scene)
     _require_recordings(recordings)
-    for doubt in doubt_of_funnel("the scene", scene):
+    for doubt in doubt_of_start("the scene", scene):
         warnings.warn(doubt, DoubtfulRecordingWarning, stacklevel=2)
     for each in recordings:
         for doubt in each.doubts(scene, prior):

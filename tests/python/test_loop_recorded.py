@@ -22,7 +22,7 @@ from granulcal.loop.effects.library import by_name
 from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.measures import Measures
 from granulcal.loop.preregistration import register
-from granulcal.loop.recorded import _missing_share, doubt_of_funnel, require_no_copies
+from granulcal.loop.recorded import _missing_share, doubt_of_start, require_no_copies
 from granulcal.loop.report.page import sentence_of
 from granulcal.loop.task import Task
 from granulcal.loop.test.thresholds import Thresholds
@@ -257,9 +257,13 @@ def test_a_map_a_funnel_above_the_camera_and_pixels_without_data_are_told(
     hung = gc.Scene.funnel(0.02).with_({"funnel.height": 2.0, "camera.height": 0.3})
     assert (
         "(funnel.height = 2 m) is above the camera (camera.height = 0.3 m)"
-        in (doubt_of_funnel("2 cm", hung)[0])
+        in (doubt_of_start("2 cm", hung)[0])
     )
-    assert doubt_of_funnel("2 cm", hung.with_({"funnel.height": 0.02})) == []
+    assert doubt_of_start("2 cm", hung.with_({"funnel.height": 0.02})) == []
+    dropped = gc.Scene.drop(50).with_({"start.height": 3.0, "camera.height": 0.4})
+    (told,) = doubt_of_start("3 cm", dropped)
+    assert "lowest point (start.height = 3 m) is above the camera (camera.height = 0.4 m)" in told
+    assert doubt_of_start("3 cm", dropped.with_({"start.height": 0.03})) == []
 
 
 def test_a_none_by_the_base_models_own_pours_shows_the_p_that_decided() -> None:

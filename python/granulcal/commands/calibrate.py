@@ -63,7 +63,7 @@ def _run(options: argparse.Namespace) -> int:
     from granulcal.assumed import assumed
     from granulcal.bayessim.training.sequential import round_sizes
     from granulcal.engines import engine_named
-    from granulcal.loop.recorded import doubt_of_funnel
+    from granulcal.loop.recorded import doubt_of_start
     from granulcal.measured.plausible import doubts, violations
     from granulcal.pours.scene import Scene
     from granulcal.prior import Prior
@@ -85,7 +85,7 @@ def _run(options: argparse.Namespace) -> int:
             document = told_outside(options, impossible)
             print(json.dumps(document, indent=1) if options.json else outside(impossible))
             return UNHEALTHY
-        doubtful = doubt_of_funnel("the scene", scene)
+        doubtful = doubt_of_start("the scene", scene)
         doubtful += doubts(scene, prior, recordings, options.recording)
     else:
         doubtful = not_measured(measured)

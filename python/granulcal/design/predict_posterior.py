@@ -12,7 +12,7 @@ from granulcal.design.posterior_file import PosteriorDraws
 from granulcal.errors import ObservationError
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
-from granulcal.loop.recorded import doubt_of_funnel
+from granulcal.loop.recorded import doubt_of_start
 from granulcal.loop.report.prediction import FEWEST, Prediction, require_level
 from granulcal.pours.scene import Scene
 
@@ -54,13 +54,13 @@ def predict_posterior(
         forward = Forward(Path(folder), threads or cores())
         forward.fill("pours", asked)
         rows = np.concatenate([forward.pours(*one) for one in asked])
-    names, of_funnel = Measures.of(scenes[0]).names, doubt_of_funnel("the condition", scenes[0])
+    names, of_start = Measures.of(scenes[0]).names, doubt_of_start("the condition", scenes[0])
     try:
         found = Prediction.of_pours("posterior", names, rows, level, asked=pours)
     except ObservationError as error:
         # Too few pours are seen: most often why.
-        raise ObservationError("; ".join([str(error), *of_funnel])) from None
-    return replace(found, doubts=(*_asked_for(posterior, at), *of_funnel, *found.doubts))
+        raise ObservationError("; ".join([str(error), *of_start])) from None
+    return replace(found, doubts=(*_asked_for(posterior, at), *of_start, *found.doubts))
 
 
 def poured_scenes(

@@ -24,7 +24,7 @@ from granulcal.measured.recording import Formation, Recording, UnlikeFramesWarni
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
-__all__ = ["doubt_of_funnel", "doubts_of", "require_no_copies"]
+__all__ = ["doubt_of_start", "doubts_of", "require_no_copies"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -35,6 +35,11 @@ _MISSING = 0.005
 # Share by which the distance of the ground may be off the scene's: what stereo cameras promise of
 # their depths.
 _DISTANCE = 0.02
+# Heights above the ground from which grains are let go, and what hangs there.
+_LET_GO = (
+    ("funnel.height", "the funnel's tip"),
+    ("start.height", "the grains' lowest point"),
+)
 
 
 def require_no_copies(conditions: Sequence[Condition], rows: Sequence[Array]) -> None:
@@ -122,8 +127,8 @@ def _doubts_of_one(
         missing.append(_missing_share(formation))
         distances.append(abs(formation.plane.offset))
     found += doubts_of_frames(there, prior, opened, condition.recordings)
-    of_funnel = doubt_of_funnel(condition.name, there)
-    of_all = [*of_funnel, *_doubt_of_missing(there, condition, missing), *found]
+    of_start = doubt_of_start(condition.name, there)
+    of_all = [*of_start, *_doubt_of_missing(there, condition, missing), *found]
     return of_all, distances[0]
 
 
@@ -134,19 +139,21 @@ def _opened(path: Path, condition: Condition) -> Recording:
         return Recording.open(path, camera=camera_used(path, condition.camera))
 
 
-def doubt_of_funnel(name: str, there: Scene) -> list[str]:
-    """Returns whether the funnel hangs above the camera, as with a height in another unit."""
+def doubt_of_start(name: str, there: Scene) -> list[str]:
+    """Returns whether grains are let go above the camera, as with a height in another unit."""
     tables = there.to_dict()
-    camera, funnel = tables["camera"], tables.get("funnel")
-    if camera["projection"] != "pinhole" or funnel is None:
+    camera = tables["camera"]
+    if camera["projection"] != "pinhole":
         return []
-    tip, eye = funnel["height"], camera["height"]
-    if tip < eye:
-        return []
-    return [
-        f"{name}: the funnel's tip (funnel.height = {tip:g} m) is above the camera "
-        f"(camera.height = {eye:g} m): is it in metres?"
-    ]
+    for path, what in _LET_GO:
+        table, key = path.split(".")
+        height = tables.get(table, {}).get(key)
+        if height is not None and height >= camera["height"]:
+            return [
+                f"{name}: {what} ({path} = {height:g} m) is above the camera "
+                f"(camera.height = {camera['height']:g} m): is it in metres?"
+            ]
+    return []
 
 
 def _doubts_of_distance(
