@@ -1,5 +1,6 @@
 """What speaks against a verdict without taking it away."""
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -10,11 +11,13 @@ from granulcal.loop.check.alarms import (
     of_base_fit,
     of_ends,
     of_error,
+    of_exchange,
     of_labels,
     of_left,
     of_placebo,
     of_untried,
 )
+from granulcal.loop.condition import Condition
 from granulcal.loop.effects.library import by_name
 from granulcal.loop.effects.untried import untried
 from granulcal.loop.test.distance import Improvement, compare
@@ -134,3 +137,27 @@ def test_recordings_of_other_conditions_are_told() -> None:
     swapped = {"2": right["6"], "4": right["4"], "6": right["2"]}
     (told,) = of_labels(swapped, base, spread)
     assert "those of 2 like pours of 6, those of 6 like pours of 2" in told and "of 4" not in told
+
+
+def test_a_sealed_condition_that_was_exchanged_with_a_fitted_one_is_told() -> None:
+    """The fits follow the wrong label, so that the error is at the sealed one alone."""
+
+    def pours(level: float, seed: int, count: int) -> NDArray[np.float64]:
+        return level + 0.1 * np.random.default_rng(seed).standard_normal((count, 3))
+
+    def condition(name: str, use: str, **known: float) -> Condition:
+        return Condition(name, {"start.height": float(name[0])}, use, (Path(name),), known=known)
+
+    fitted = condition("2", "fit"), condition("4", "fit")
+    base = {name: pours(level, 9, 10) for name, level in (("2", 0.0), ("4", 1.6), ("6", 3.0))}
+    swapped = {"2": pours(0.0, 5, 3), "4": pours(2.0, 6, 3), "6": pours(1.2, 7, 3)}
+    every, spread = (*fitted, condition("6", "sealed")), np.ones(2)
+    none, left = error(0.0, 0.0), error(1.0, 1.0)
+    (told,) = of_exchange(every, swapped, base, spread, (none, left))
+    assert "those of 4 like pours of 6, those of 6 like pours of 4" in told
+    assert of_exchange(every, swapped, base, spread, (none, none)) == ()
+    assert of_exchange(every, swapped, base, spread, (none, None)) == ()
+    # Another day of the same numbers is nothing to be exchanged with.
+    again = {**base, "2 again": base["4"]}, {**swapped, "2 again": swapped["4"]}
+    days = (*fitted, condition("2 again", "sealed"))
+    assert of_exchange(days, again[1], again[0], spread, (none, left)) == ()

@@ -25,7 +25,7 @@ from granulcal.loop.check.alarms import (
     of_base_fit,
     of_ends,
     of_error,
-    of_labels,
+    of_exchange,
     of_left,
     of_placebo,
     of_prior,
@@ -232,10 +232,10 @@ def close_loop(
     single = [o for c, o in zip(analysis.fitted, observed, strict=True) if not c.averaged]
     at_fit = found.fit_of(found.best)
     alarms += of_scatter(scatter_of(surrogate, at_fit, single, seed=seed), rules)
-    if fit.total_before.interval[0] > 0:
-        fitted = {c.name: measured[c.name] for c in analysis.fitted}
-        spread = surrogate.raw_spread[: Measures.of(task.scene).head]
-        alarms += of_labels(fitted, {n: simulated[n].base for n in fitted}, spread)
+    spread = surrogate.raw_spread[: Measures.of(task.scene).head]
+    of_base_pours = {name: pours.base for name, pours in simulated.items()}
+    everywhere = (*analysis.fitted, *hidden)
+    alarms += of_exchange(everywhere, measured, of_base_pours, spread, (fit, sealed))
     for alarm in alarms:
         say(f"warning: {alarm}")
     closed = Closed(

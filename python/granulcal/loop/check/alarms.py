@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.check.standing import Standing
+from granulcal.loop.condition import Condition
 from granulcal.loop.effects.library import LIBRARY, LibraryEffect
 from granulcal.loop.pours.cube import from_cube
 from granulcal.loop.pours.replicates import FEWEST
@@ -20,6 +21,7 @@ __all__ = [
     "of_base_fit",
     "of_ends",
     "of_error",
+    "of_exchange",
     "of_labels",
     "of_left",
     "of_placebo",
@@ -139,13 +141,39 @@ def of_prior(verdict: Verdict, base: Explanation, task: Task) -> tuple[str, ...]
     )
 
 
+def of_exchange(
+    conditions: Sequence[Condition],
+    measured: Mapping[str, Array],
+    base: Mapping[str, Array],
+    spread: Array,
+    errors: Sequence[Improvement | None],
+) -> tuple[str, ...]:
+    """Returns what `of_labels` says, where the base model leaves an error.
+
+    Sealed conditions are among them: fits follow the recordings that were labelled as others, and
+    what they leave is then where nothing was fitted.
+
+    Args:
+        conditions: all of a task, those to fit first; of several with the same numbers the first.
+        measured: as of `of_labels`, like the rest.
+        base: of the base model's pours.
+        spread: of the archive.
+        errors: at the conditions to fit, and at the sealed ones if there are any.
+    """
+    if not any(error is not None and error.total_before.interval[0] > 0 for error in errors):
+        return ()
+    places = [(dict(one.at), dict(one.known)) for one in conditions]
+    own = [one.name for i, one in enumerate(conditions) if places[i] not in places[:i]]
+    return of_labels({n: measured[n] for n in own}, {n: base[n] for n in own}, spread)
+
+
 def of_labels(
     measured: Mapping[str, Array], base: Mapping[str, Array], spread: Array
 ) -> tuple[str, ...]:
     """Returns which conditions have recordings that are nearer to pours of other conditions.
 
     Args:
-        measured: statistics of the pours of each condition to fit, shape (n, s).
+        measured: statistics of the pours of each condition, shape (n, s).
         base: of the base model's pours at its fit, by the same names, shape (k, s).
         spread: of the archive, of the first statistics, which are compared, shape (m,).
     """
@@ -162,7 +190,7 @@ def of_labels(
     rows, columns = linear_sum_assignment(squares)
     stated, best = float(np.trace(squares)), float(squares[rows, columns].sum())
     others = [(names[i], names[j]) for i, j in zip(rows, columns, strict=True) if i != j]
-    if not others or best > _EXCHANGED * stated:
+    if not others or stated <= 0 or best > _EXCHANGED * stated:
         return ()
     said = ", ".join(f"those of {of} like pours of {at}" for of, at in others)
     return (
