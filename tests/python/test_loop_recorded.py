@@ -246,6 +246,13 @@ def test_a_map_a_funnel_above_the_camera_and_pixels_without_data_are_told(
     assert "the ground lies 0.3 m from the camera, of the scene's" in doubt
     assert doubt.startswith("here: ") and "5 % too large" in doubt
     assert task_of(scene.with_({"camera.height": 0.297}), recorded).require_readable() == ()
+    # Of one recording alone, which need not be the first.
+    odd = tmp_path / "odd.npy"
+    np.save(odd, 1.05 * np.asarray(gc.Recording.open(recorded[1]).depth))
+    shutil.copy(recorded[1].parent / "camera.toml", tmp_path)
+    among = [recorded[0], odd, recorded[2]]
+    (doubt,) = task_of(scene, among).require_readable()
+    assert doubt.startswith(f"here: the ground of {odd} (0.315 m) is not as far from the camera")
     # More than three times as far off a recording asks for the unit, and nothing says it again.
     for height, is_told_of_unit in ((0.102, False), (0.098, True)):
         told = task_of(scene.with_({"camera.height": height}), recorded).require_readable()

@@ -8,6 +8,7 @@ task at full strength.
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from statistics import median_low
 from typing import Any
 
 import numpy as np
@@ -103,7 +104,7 @@ def doubts_of(
 def _doubts_of_one(
     condition: Condition, scene: Scene, prior: Prior, library: Sequence[LibraryEffect]
 ) -> tuple[list[str], float]:
-    """Doubts of a condition's images, and the distance of the first one's ground [m]."""
+    """Doubts of a condition's images, and the distance of the ground of most of them [m]."""
     there = scene.with_(condition.at)
     found: list[str] = []
     missing: list[float] = []
@@ -128,8 +129,11 @@ def _doubts_of_one(
         distances.append(abs(formation.plane.offset))
     found += doubts_of_frames(there, prior, opened, condition.recordings)
     of_start = doubt_of_start(condition.name, there)
-    of_all = [*of_start, *_doubt_of_missing(there, condition, missing), *found]
-    return of_all, distances[0]
+    of_images = [
+        *_doubt_of_missing(there, condition, missing),
+        *_doubt_of_odd(there, condition, distances),
+    ]
+    return [*of_start, *of_images, *found], median_low(distances)
 
 
 def _opened(path: Path, condition: Condition) -> Recording:
@@ -161,14 +165,14 @@ def _doubts_of_distance(
 ) -> list[str]:
     """Whether the ground is as far from the camera as the scene says, a sentence each.
 
-    Depths have their own scale in it. One recording speaks for those of its condition, for no
-    camera is moved between them. Where it is so far off that the doubts of a recording ask for the
-    unit, they have said it.
+    Depths have their own scale in it. One recording speaks for those of its condition, of which
+    the odd ones are told. Where it is so far off that the doubts of a recording ask for the unit,
+    they have said it.
 
     Args:
         conditions: those of images.
         scene: the base model.
-        distances: of the ground from the camera under each [m].
+        distances: of the ground from the camera under each, of most recordings [m].
     """
     conditions_of: dict[tuple[float, float], list[str]] = {}
     for condition, found in zip(conditions, distances, strict=True):
@@ -176,7 +180,7 @@ def _doubts_of_distance(
         if camera["projection"] != "pinhole":
             continue
         stated = float(camera["height"])
-        if 1 + _DISTANCE < max(found / stated, stated / found) <= _native.UNIT_FACTOR:
+        if _is_off(found, stated):
             key = stated, float(f"{found:.3g}")
             conditions_of.setdefault(key, []).append(condition.name)
     return [
@@ -187,6 +191,31 @@ def _doubts_of_distance(
         "not, say the height in the scene"
         for (stated, found), names in conditions_of.items()
     ]
+
+
+def _doubt_of_odd(there: Scene, condition: Condition, distances: Sequence[float]) -> list[str]:
+    """Whether recordings of one condition are not all of one camera at one place."""
+    if there.to_dict()["camera"]["projection"] != "pinhole":
+        # A map has its heights from anywhere.
+        return []
+    usual = median_low(distances)
+    odd = [
+        f"{path} ({found:.3g} m)"
+        for path, found in zip(condition.recordings, distances, strict=True)
+        if _is_off(found, usual)
+    ]
+    if not odd:
+        return []
+    return [
+        f"{condition.name}: the ground of {', '.join(odd)} is not as far from the camera as that "
+        f"of the other recordings ({usual:.3g} m): is it of another camera, whose lens it needs, "
+        "or of one that was moved?"
+    ]
+
+
+def _is_off(found: float, usual: float) -> bool:
+    """Whether a distance differs by more than depths do, and by less than another unit makes."""
+    return 1 + _DISTANCE < max(found / usual, usual / found) <= _native.UNIT_FACTOR
 
 
 def _missing_share(formation: Formation) -> float:
