@@ -361,7 +361,22 @@ def test_a_pile_that_no_material_explains_is_outside_for_report_and_calibrate(
         str(page),
     ]
     assert cli.main(words) == 3
-    assert "OUTSIDE THE MODEL" in capfd.readouterr().out and page.exists()
+    told = capfd.readouterr()
+    assert "OUTSIDE THE MODEL" in told.out and page.exists() and "another prior" not in told.err
+    # Pours of another prior are told, and are not what the model was trained on.
+    narrow = made.prior.to_toml().replace("low = 0.2\n", "low = 0.25\n", 1)
+    others = gc.generate(
+        small_scene, gc.Prior.from_toml(narrow), 30, seed=6, out=tmp_path / "30", progress=False
+    )
+    data.unlink()
+    others.save(data)
+    assert cli.main([*words, "--json"]) == 3
+    captured = capfd.readouterr()
+    found = json.loads(captured.out)
+    differs = "material.sliding_friction is uniform from 0.25 to 1 there and uniform from 0.2 to 1"
+    assert differs in captured.err and any(differs in each for each in found["warnings"])
+    text = page.read_text(encoding="utf-8")
+    assert differs in text and f"a model trained on {len(small_data)} pours" in text
     scene, prior = tmp_path / "scene.toml", tmp_path / "prior.toml"
     scene.write_text(small_scene.to_toml())
     prior.write_text(made.prior.to_toml())

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from granulcal.commands.dry_run import add_dry_run, say_seconds
 from granulcal.commands.exit_code import DONE, UNHEALTHY
+from granulcal.commands.other_prior import difference
 from granulcal.commands.reading import TRAINING
 from granulcal.paths import READS, writes
 from granulcal.starter.models import model_named
@@ -113,18 +114,9 @@ def _require_same_prior(options: argparse.Namespace, found: "Prior", own: "Prior
     Raises:
         ValueError: says what differs.
     """
-    if found.to_toml() == own.to_toml():
+    what = difference(found, own)
+    if not what:
         return
-    there, here = (
-        {each.path: each.in_words for each in prior.parameters} for prior in (found, own)
-    )
-    differ = [
-        f"{path} is {there.get(path, 'not named')} there and {here.get(path, 'not named')} in the "
-        "model"
-        for path in {**here, **there}
-        if there.get(path) != here.get(path)
-    ]
-    what = "; ".join(differ) or "its parameters are in another order"
     raise ValueError(
         f"{options.data} was drawn from another prior than the model's: {what}. A check needs "
         "pours of `granulcal generate` with the model's prior and another --seed"

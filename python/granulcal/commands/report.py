@@ -9,6 +9,7 @@ from granulcal.commands import observed
 from granulcal.commands.counts import pour_count, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import UNHEALTHY
+from granulcal.commands.other_prior import difference
 from granulcal.commands.reading import (
     TRAINING,
     add_recordings,
@@ -79,19 +80,35 @@ def _run(options: argparse.Namespace) -> int:
         raise FileNotFoundError(f"{folder} came without its training pours: {told}")
     data = Dataset.load(training)
     require_same_scene(model, data.scene)
+    unlike = _unlike(options, model, data)
     if options.data is None:
         require_own_pours(model, data, training)
     if options.dry_run:
         # At the mode, at the prior's mean, at draws.
         pours = 2 * options.seeds + (0 if is_of_observed else options.draws)
         return say_how_long(options, data.scene, model.prior, pours)
+    warn(unlike)
     if is_of_observed:
-        return _of_observed(options, model, data, measured)
-    return _of_images(options, model, data)
+        return _of_observed(options, model, data, measured, unlike)
+    return _of_images(options, model, data, unlike)
+
+
+def _unlike(options: argparse.Namespace, model: Any, data: "Dataset") -> list[str]:
+    """Returns that the pours of --data are of another prior than the model, if they are."""
+    if options.data is None or not (what := difference(data.prior, model.prior)):
+        return []
+    return [
+        f"{options.data} was drawn from another prior than the model's: {what}. The page's "
+        "standard deviations are those of these pours, not of the model's"
+    ]
 
 
 def _of_observed(
-    options: argparse.Namespace, model: Any, data: "Dataset", measured: list[dict[str, float]]
+    options: argparse.Namespace,
+    model: Any,
+    data: "Dataset",
+    measured: list[dict[str, float]],
+    unlike: list[str],
 ) -> int:
     from granulcal.calibrate import calibrate_measured
 
@@ -104,12 +121,13 @@ def _of_observed(
             report=options.out,
             seeds=options.seeds,
             threads=options.threads,
-            **_said(options, data, words),
+            notes=unlike,
+            **_said(options, model, data, words),
         )
-    return _tell(options, found, [], [])
+    return _tell(options, found, [], unlike)
 
 
-def _of_images(options: argparse.Namespace, model: Any, data: "Dataset") -> int:
+def _of_images(options: argparse.Namespace, model: Any, data: "Dataset", unlike: list[str]) -> int:
     from granulcal.calibrate import calibrate
     from granulcal.measured.plausible import doubts, violations
 
@@ -120,6 +138,7 @@ def _of_images(options: argparse.Namespace, model: Any, data: "Dataset") -> int:
         return UNHEALTHY
     doubtful = doubts(data.scene, model.prior, recordings, options.recording)
     warn(doubtful)
+    doubtful = [*unlike, *doubtful]
     words = [*reading_words(options), *_own_words(options), "--draws", str(options.draws)]
     with shown():
         found = calibrate(
@@ -131,7 +150,7 @@ def _of_images(options: argparse.Namespace, model: Any, data: "Dataset") -> int:
             draws=options.draws,
             threads=options.threads,
             notes=doubtful,
-            **_said(options, data, words),
+            **_said(options, model, data, words),
         )
     return _tell(options, found, recordings, doubtful)
 
@@ -141,14 +160,16 @@ def _own_words(options: argparse.Namespace) -> list[str]:
     return words if options.data is None else [*words, "--data", str(options.data)]
 
 
-def _said(options: argparse.Namespace, data: "Dataset", words: list[str]) -> dict[str, Any]:
+def _said(
+    options: argparse.Namespace, model: Any, data: "Dataset", words: list[str]
+) -> dict[str, Any]:
     """Title, summary and command of the page."""
     names = " ".join(str(path) for path in options.recording)
     command = ["granulcal", "report", str(options.model), *map(str, options.recording), *words]
     return {
         "title": f"Calibration from {names}",
         "summary": f"Parameters of the scene {data.scene.name!r}, inferred from {names} "
-        f"with a model trained on {len(data)} pours.",
+        f"with a model trained on {model.summary.pair_count} pours.",
         "command": shlex.join(command),
     }
 
