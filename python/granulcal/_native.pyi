@@ -51,7 +51,14 @@ class Emulated:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
     def misfit(
         self, reference: dict[str, NDArray[np.float64]], z: NDArray[np.float64], names: list[str]
-    ) -> tuple[float, float, float | None, list[tuple[str, float, float]], str]: ...
+    ) -> tuple[
+        float,
+        float,
+        float | None,
+        list[tuple[str, float, float]],
+        tuple[int, float, float] | None,
+        str,
+    ]: ...
 
 @final
 class Posterior:

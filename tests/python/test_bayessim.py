@@ -113,6 +113,23 @@ def test_pours_of_two_materials_are_outside_though_a_third_has_their_mean(toy, t
     assert trained.misfit(toy.simulate_at(one, seed=1)).scatter_p_value is None
 
 
+def test_one_pour_of_another_material_among_ten_is_named(toy, trained):
+    generator = np.random.default_rng(1)
+    called, named = 0, 0
+    for seed in range(40):
+        theta = toy.prior.from_unconstrained(0.7 * generator.standard_normal((1, 3)))
+        x = toy.simulate_at(np.repeat(theta, 10, axis=0), seed=seed)
+        called += trained.misfit(x).odd_pour is not None
+        other = toy.prior.from_unconstrained([[-2.0, 2.0, -2.0]])
+        x[seed % 10] = toy.simulate_at(other, seed=seed)[0]
+        odd = trained.misfit(x).odd_pour
+        named += odd is not None and odd.number == seed % 10 + 1
+    assert called <= 2 and named >= 30
+    told = str(trained.misfit(x))
+    assert f"Pour {seed % 10 + 1} is odd: it lies" in told and told.endswith("Is it one of them?")
+    assert trained.misfit(x[:2]).odd_pour is None
+
+
 def test_own_calibration_check_is_stored_and_holds(toy, trained):
     assert trained.calibration.test_count == 240
     assert trained.calibration.posterior_loss < trained.calibration.prior_loss - 2

@@ -22,6 +22,7 @@ FIELDS = {
 }  # fmt: skip
 OF_INSIDE = {
     "is_inside", "impossible", "p_value", "joint_p_value", "scatter_p_value", "statistics",
+    "odd_pour",
 }  # fmt: skip
 SMALL: dict[str, Any] = {
     "features": 8,

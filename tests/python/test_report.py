@@ -9,7 +9,7 @@ import pytest
 
 import granulcal as gc
 from granulcal.bayessim.check.identifiability import NO_TRACE, Identifiability
-from granulcal.bayessim.check.misfit import Misfit, StatisticMisfit
+from granulcal.bayessim.check.misfit import Misfit, OddPour, StatisticMisfit
 from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.bayessim.network.mixture import Mixture
 from granulcal.parameter import Parameter
@@ -161,12 +161,14 @@ def test_pours_of_two_materials_are_told_as_such(posterior, small_data, small_po
             joint_p_value=0.6,
             scatter_p_value=0.005,
             statistics=(StatisticMisfit("max_z", 0.5, 0.9),),
+            odd_pour=OddPour(number=2, times=3.5, p_value=0.001),
         ),
         data=small_data,
     )
     text = of_two.read_text(encoding="utf-8")
     assert "these 2 pours differ more from each other than pours of one material do" in text
     assert "no parameters explain" not in text and "best compromise" not in text
+    assert "Pour 2 is odd:</strong> it lies 3.5 times as far from the others" in text
 
 
 def test_the_page_of_several_recordings_says_which_one_it_shows(

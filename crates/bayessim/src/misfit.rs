@@ -16,6 +16,7 @@ use crate::best_fit::{BestFit, Fit, Pooled};
 use crate::emulator::Prediction;
 use crate::likelihood::averaging_share;
 use crate::matrix::{Matrix, dot};
+use crate::odd_pour::OddPour;
 use crate::random::Random;
 use crate::tensors::Tensors;
 
@@ -51,6 +52,8 @@ pub struct Misfit {
     pub scatter_p_value: Option<f64>,
     /// Each statistic, the largest residual first.
     pub statistics: Vec<StatisticMisfit>,
+    /// A pour that lies apart from the others; no part of the p-values.
+    pub odd_pour: Option<OddPour>,
 }
 
 impl Misfit {
@@ -62,6 +65,13 @@ impl Misfit {
 
 impl fmt::Display for Misfit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.tell(f)?;
+        self.odd_pour.iter().try_for_each(|odd| write!(f, "\n{odd}"))
+    }
+}
+
+impl Misfit {
+    fn tell(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let what = match self.pours {
             1 => "this pour".to_owned(),
             count => format!("these {count} pours"),
@@ -152,7 +162,11 @@ impl MisfitReference {
         let noise = Prediction::of(&here).noise;
         let scatter = (0..size).map(|j| signal(noise[j]) * spread(j) / noise[j]).sum();
         let scatters = Some((scatter, &null.scatters[..]));
-        compared(names, z.len(), &found, &null.squares, &null.residuals, scatters)
+        // The noise of models of before is not in units of where its pair is.
+        let unit = self.is_unit.then_some(&self.own_noise);
+        let odd_pour = unit.and_then(|own| OddPour::among(&y, noise, own));
+        let found = compared(names, z.len(), &found, &null.squares, &null.residuals, scatters);
+        Misfit { odd_pour, ..found }
     }
 
     /// What sets of pours at `u` leave.
@@ -270,7 +284,7 @@ fn compared(
     };
     let below = (0..count).filter(|&i| null(i) <= smallest).count();
     let p_value = (1 + below) as f64 / (1 + count) as f64;
-    Misfit { pours, p_value, joint_p_value, scatter_p_value, statistics }
+    Misfit { pours, p_value, joint_p_value, scatter_p_value, statistics, odd_pour: None }
 }
 
 /// Rank among values of the model itself.

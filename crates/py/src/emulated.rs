@@ -14,7 +14,7 @@ use crate::error;
 const NAME: &str = "the emulator";
 
 /// P-value, joint p-value, that of the scatter, name, residual and p-value of each statistic, and all of it in words.
-type Found = (f64, f64, Option<f64>, Vec<(String, f64, f64)>, String);
+type Found = (f64, f64, Option<f64>, Vec<(String, f64, f64)>, Option<(usize, f64, f64)>, String);
 /// Squared lengths, shape (n,), and residuals, shape (n, s).
 type BestFits<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 
@@ -99,9 +99,10 @@ impl Emulated {
         let (reference, z) = (reference.map_err(error::model)?, self.pours(z)?);
         let found = py.detach(|| self.inner.misfit(&reference, &z, &names));
         let text = found.to_string();
-        let Misfit { p_value, joint_p_value, scatter_p_value, statistics, .. } = found;
+        let Misfit { p_value, joint_p_value, scatter_p_value, statistics, odd_pour, .. } = found;
         let each = statistics.into_iter().map(|s| (s.name, s.residual, s.p_value)).collect();
-        Ok((p_value, joint_p_value, scatter_p_value, each, text))
+        let odd_pour = odd_pour.map(|odd| (odd.number, odd.times, odd.p_value));
+        Ok((p_value, joint_p_value, scatter_p_value, each, odd_pour, text))
     }
 }
 

@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 import warnings
+from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -145,6 +146,7 @@ def _document(
         "inside_model": {
             "is_inside": found.misfit.is_inside,
             "p_value": found.misfit.p_value,
+            "odd_pour": asdict(found.misfit.odd_pour) if found.misfit.odd_pour else None,
             "impossible": [],
         },
         "pours": len(found.x),

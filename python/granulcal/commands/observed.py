@@ -5,6 +5,7 @@ import json
 import math
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -135,6 +136,7 @@ def run(options: argparse.Namespace, folder: Path, document: dict[str, Any]) -> 
                 each.name: {"residual": each.residual, "p_value": each.p_value}
                 for each in misfit.statistics
             },
+            "odd_pour": asdict(misfit.odd_pour) if misfit.odd_pour else None,
         },
         "identifiability": known.as_dict(),
         "calibrated": document.get("is_calibrated") is True,

@@ -3,6 +3,7 @@
 import argparse
 import shlex
 import sys
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from granulcal.commands import observed
@@ -180,7 +181,7 @@ def _tell(
     """Says where the page is and what is wrong with it; returns the exit code."""
     from granulcal.pours.left_out import LeftOut
 
-    if not found.misfit.is_inside:
+    if not found.misfit.is_inside or found.misfit.odd_pour:
         print(found.misfit)
     print(found.report)
     left_out = LeftOut.of_pours([*found.pours, *found.prior_pours])
@@ -188,7 +189,11 @@ def _tell(
         print(f"note: of the pours on the page cannot be used: {left_out}", file=sys.stderr)
     options.told |= {
         "report": str(found.report),
-        "inside_model": {"is_inside": found.misfit.is_inside, "p_value": found.misfit.p_value},
+        "inside_model": {
+            "is_inside": found.misfit.is_inside,
+            "p_value": found.misfit.p_value,
+            "odd_pour": asdict(found.misfit.odd_pour) if found.misfit.odd_pour else None,
+        },
         "left_out": left_out.to_dict(),
         "warnings": doubtful,
     }

@@ -22,6 +22,15 @@ with the noise s at the fit (an axis has variance 1 over the prior, so that 1 - 
 the parameters there), is ranked among that of as many held-out residuals, and the smallest p-value
 of all is ranked once more.
 
+One wrong recording among ten moves their mean by a tenth of what is wrong with it, which none of
+these need see. The largest of the squared distances of a pour from the mean of the others,
+
+$$ d_i = \frac{k}{k - 1} \sum_j (y_{ij} - \bar y_j)^2 / s_j^2, $$
+
+is ranked among that of as many held-out residuals, and so is its share of their sum: where all
+pours differ by more than the model's, none is odd. What is told of an odd pour is no part of the
+p-values.
+
 Evaluated by the extension (`crates/bayessim/src/misfit.rs`).
 
 Reference:
@@ -39,7 +48,7 @@ from numpy.typing import NDArray
 from granulcal import _native
 from granulcal.bayessim.emulator.likelihood import Fold, Likelihood
 
-__all__ = ["Misfit", "MisfitReference", "StatisticMisfit"]
+__all__ = ["Misfit", "MisfitReference", "OddPour", "StatisticMisfit"]
 
 Array = NDArray[np.float64]
 
@@ -63,6 +72,21 @@ class StatisticMisfit:
 
 
 @dataclass(frozen=True)
+class OddPour:
+    """A pour that lies farther from the others than pours of one material do.
+
+    Attributes:
+        number: of the pour, from 1.
+        times: its distance from the mean of the others over that of a pour of the same material.
+        p_value: chance of a distance as large, if all are of one material; at most 0.002.
+    """
+
+    number: int
+    times: float
+    p_value: float
+
+
+@dataclass(frozen=True)
 class Misfit:
     """Whether any parameters explain an observation.
 
@@ -74,6 +98,7 @@ class Misfit:
         statistics: each statistic, largest residual first.
         text: the same in words.
         scatter_p_value: of how much several pours differ from each other; None of one pour.
+        odd_pour: of three or more the one that is not of their material, if one is that far off.
     """
 
     pours: int
@@ -82,6 +107,7 @@ class Misfit:
     statistics: tuple[StatisticMisfit, ...]
     text: str = field(default="", repr=False, compare=False)
     scatter_p_value: float | None = None
+    odd_pour: OddPour | None = None
 
     @property
     def is_inside(self) -> bool:
@@ -96,7 +122,7 @@ class Misfit:
         return not self.is_inside and scatter is not None and scatter <= others
 
     def __str__(self) -> str:
-        """One or two lines."""
+        """One to three lines."""
         return self.text
 
 
@@ -142,8 +168,9 @@ class MisfitReference:
     def test(self, likelihood: Likelihood, z: Array, names: Sequence[str]) -> Misfit:
         """Returns the test of k pours `z` (k, s), standardised; `names` are the statistics."""
         arrays = {name: np.ascontiguousarray(array) for name, array in self.arrays().items()}
-        p_value, joint, scatter, statistics, text = likelihood.native.misfit(
+        p_value, joint, scatter, statistics, odd, text = likelihood.native.misfit(
             arrays, np.ascontiguousarray(z), list(names)
         )
         each = tuple(StatisticMisfit(*found) for found in statistics)
-        return Misfit(len(z), p_value, joint, each, text, scatter)
+        odd_pour = None if odd is None else OddPour(*odd)
+        return Misfit(len(z), p_value, joint, each, text, scatter, odd_pour)

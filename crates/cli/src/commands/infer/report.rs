@@ -124,6 +124,9 @@ impl<'a> Report<'a> {
             "joint_p_value": misfit.map(|misfit| misfit.joint_p_value),
             "scatter_p_value": misfit.and_then(|misfit| misfit.scatter_p_value),
             "statistics": statistics,
+            "odd_pour": misfit.and_then(|misfit| misfit.odd_pour).map(|odd| {
+                json!({ "number": odd.number, "times": odd.times, "p_value": odd.p_value })
+            }),
         })
     }
 
