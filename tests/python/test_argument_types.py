@@ -110,6 +110,8 @@ def test_a_recordings_numbers_are_the_callers() -> None:
     """The column had been refused half a pixel aside, the border by an OverflowError."""
     with pytest.raises(ValueError, match=r"cx \[px\] must be in \[-4\.5, 7\.5\], got 30$"):
         gc.Recording.from_depth(DEPTH, **{**LENS, "cx": 30.0})
+    with pytest.raises(ValueError, match=r"fx must be in pixels, .* is it in millimetres"):
+        gc.Recording.from_depth(DEPTH, **{**LENS, "fx": 1e-3, "fy": 1e-3})
     recording = gc.Recording.from_depth(DEPTH, **LENS)
     for name in ("border_px", "plane_seed"):
         with pytest.raises(ValueError, match=rf"{name}: must be a whole number from 0 .*got -1"):

@@ -129,6 +129,13 @@ def test_errors_are_those_of_python(small_scene, tmp_path):
         gc.generate(small_scene, gc.Prior([unknown]), 1, progress=False)
 
 
+def test_the_folder_of_a_calibration_is_no_data_set(small_scene, small_prior, tmp_path):
+    (tmp_path / "pours.json").write_text("{}")
+    with pytest.raises(ValueError, match="without one, for it holds the pours of .calib"):
+        gc.generate(small_scene, small_prior, 2, out=tmp_path, progress=False)
+    assert [path.name for path in tmp_path.iterdir()] == ["pours.json"]
+
+
 @pytest.mark.skipif(
     not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere"
 )

@@ -177,21 +177,29 @@ impl CameraToml {
             let allowed = "given by all of width, height, fx, fy, cx, cy, or by none";
             return Err(DatasetError::content(path, "the lens", found, allowed));
         };
-        for (name, focal, side, pixels) in
-            [("fx", fx, "width", width), ("fy", fy, "height", height)]
-        {
-            let least = LEAST_FOCAL * pixels as f64;
-            if focal > 0.0 && focal < least {
-                let allowed = format!(
-                    "in pixels, at least {least} (a twentieth of the {side}): is it in millimetres or metres?"
-                );
-                return Err(DatasetError::content(path, name, focal.to_string(), allowed));
-            }
-        }
+        require_pixels(path, (width, height), (fx, fy))?;
         Intrinsics::from_integer_centres(width, height, fx, fy, cx, cy)
             .map(Some)
             .map_err(|source| DatasetError::Recording { path: path.to_owned(), source })
     }
+}
+
+/// Refuses focal lengths that are in no pixels, of the file at `path` or an array.
+pub(crate) fn require_pixels(
+    path: &Path,
+    (width, height): (usize, usize),
+    (fx, fy): (f64, f64),
+) -> Result<(), DatasetError> {
+    for (name, focal, side, pixels) in [("fx", fx, "width", width), ("fy", fy, "height", height)] {
+        let least = LEAST_FOCAL * pixels as f64;
+        if focal > 0.0 && focal < least {
+            let allowed = format!(
+                "in pixels, at least {least} (a twentieth of the {side}): is it in millimetres or metres?"
+            );
+            return Err(DatasetError::content(path, name, focal.to_string(), allowed));
+        }
+    }
+    Ok(())
 }
 
 fn require_unit(path: &Path, unit: f64) -> Result<(), DatasetError> {

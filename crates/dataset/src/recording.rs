@@ -16,7 +16,7 @@ use granulcal_features::{
 pub use folder::{Folder, Frame};
 pub use options::{FRAMES, ReadOptions, camera_beside};
 
-use crate::camera_file::camera_of;
+use crate::camera_file::{camera_of, require_pixels};
 use crate::depth_frame::{DepthFrame, Values};
 use crate::fault::Fault;
 use crate::input::{Input, ReadSeek};
@@ -239,12 +239,14 @@ impl Recording {
     /// The mean of depth images in memory, row by row in metres, of a camera with this lens; `name` stands in messages.
     ///
     /// # Errors
-    /// [`DatasetError::Content`] for no image, one of another size than the lens, or a depth of more than 100 m.
+    /// [`DatasetError::Content`] for no image, one of another size than the lens, a depth of more than 100 m, or a focal
+    /// length that is not in pixels.
     pub fn of_depths(
         name: &Path,
         lens: Intrinsics,
         frames: impl IntoIterator<Item = Vec<f32>>,
     ) -> Result<Self, DatasetError> {
+        require_pixels(name, (lens.width, lens.height), (lens.fx, lens.fy))?;
         let refuse = |fault: Fault| fault.in_file(name);
         let (width, height) = (lens.width, lens.height);
         let mut mean: Option<Mean> = None;

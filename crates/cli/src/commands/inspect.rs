@@ -4,9 +4,10 @@ mod args;
 mod contact_problem;
 mod recording;
 
+use std::fs;
 use std::path::Path;
 
-use anyhow::anyhow;
+use anyhow::{Context, anyhow};
 use granulcal_dataset::{
     CameraFile, Dataset, DatasetError, Folder, Npz, Prior, load_prior, load_scene, npy, png,
     read_checkpoint_header, read_text,
@@ -72,6 +73,8 @@ fn inspect(path: &Path, is_whole: &mut bool) -> anyhow::Result<Value> {
         "ckpt" => checkpoint_facts(path),
         "bag" | "mcap" => recording::facts(path, is_whole),
         other => {
+            // What is not there has no wrong ending.
+            fs::metadata(path).with_context(|| format!("cannot read {}", path.display()))?;
             let found = if other.is_empty() { "no ending" } else { other };
             let allowed = "a folder or .parquet, .toml, .npy, .npz, .png, .bag, .mcap, .ckpt";
             let path = path.display();

@@ -29,6 +29,7 @@ fn bad_scenes_priors_and_options_are_named() {
     place.write("no-path.toml", prior.replace("restitution", "bounciness"));
 
     place.refused(&["simulate", "missing.toml"], &["missing.toml"]);
+    place.refused(&["inspect", "missing.json"], &["cannot read missing.json", "No such file"]);
     for words in [
         &["simulate", "funel"][..],
         &["render", "funel", "-o", "x.png"],

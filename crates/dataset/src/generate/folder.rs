@@ -14,6 +14,9 @@ use crate::row::Row;
 use crate::table::Table;
 use crate::{DatasetError, Room, table};
 
+/// The file in which `calibrate` keeps the pours that it makes for recordings.
+const KEPT_POURS: &str = "pours.json";
+
 /// An open folder; nobody else writes into it while this lives.
 #[derive(Debug)]
 pub(super) struct Folder {
@@ -90,6 +93,10 @@ impl Folder {
     fn open(path: &Path, header: &Header, options: &GenerateOptions) -> Result<Self, DatasetError> {
         if path.exists() && !path.is_dir() {
             return Err(DatasetError::content(path, "the output", "a file", "a folder"));
+        }
+        if path.join(KEPT_POURS).exists() && !path.join(manifest::NAME).exists() {
+            let allowed = "a folder without one, for it holds the pours of `calibrate`";
+            return Err(DatasetError::content(path, "the output", KEPT_POURS, allowed));
         }
         fs::create_dir_all(path).map_err(DatasetError::io("create", path))?;
         let lock = lock(path)?;
