@@ -97,6 +97,27 @@ def test_a_recording_given_twice_is_refused(model, recording, second, tmp_path, 
     assert "recordings 1 and 3 show one formation" in capfd.readouterr().err
 
 
+def test_depths_in_too_small_a_unit_are_told_where_they_show_no_grains(
+    model, recording, tmp_path, capfd
+):
+    """Where a pixel is off `needs at least 3 points` was all that was said."""
+    pil = pytest.importorskip("PIL.Image")
+    image, _, camera = recording
+    text = Path(camera).read_text()
+    unit = float(text.partition("depth_unit = ")[2].split()[0])
+    small = text.replace(f"depth_unit = {unit}", f"depth_unit = {unit / 10}")
+    (tmp_path / "small.toml").write_text(small)
+    counts = np.asarray(pil.open(image)).copy()
+    # In that unit the image is 9 by 9 squares of the scene's own pixels: one of them.
+    side = len(counts) // 9
+    counts[3 * side : 4 * side, 3 * side : 4 * side] -= round(4e-3 / (unit / 10))
+    pil.fromarray(counts).save(tmp_path / "off.png")
+    words = ["infer", str(model[0]), str(tmp_path / "off.png")]
+    assert cli.main([*words, "--camera", str(tmp_path / "small.toml")]) == 2
+    told = capfd.readouterr().err
+    assert "at least 3 points" in told and "is the unit of the depths right" in told
+
+
 @pytest.mark.parametrize("pours", [1, 2])
 def test_both_commands_print_and_write_the_same_json(
     model, recording, second, pours, tmp_path, capfd

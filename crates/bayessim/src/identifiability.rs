@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use serde::Serialize;
 
 use crate::coordinates::Coordinates;
+use crate::short_names::short_names;
 
 /// Draws that are asked, and bins of the prior's quantiles.
 pub const DRAWS: usize = 1000;
@@ -103,8 +104,7 @@ impl Directions {
 
 impl std::fmt::Display for Identifiability {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let short: Vec<_> =
-            self.names.iter().map(|name| name.rsplit('.').next().unwrap_or(name)).collect();
+        let short = short_names(&self.names);
         let gains: Vec<_> =
             short.iter().zip(&self.gains).map(|(name, gain)| format!("{name} {gain:.2}")).collect();
         let ridge: Vec<_> = short

@@ -49,6 +49,7 @@ mod odd_pour;
 mod posterior;
 mod quasi;
 mod random;
+mod short_names;
 mod standardiser;
 mod stated_law;
 mod tensors;

@@ -84,7 +84,11 @@ impl Seen {
             Ok(statistics) => reading.chosen.iter().map(|&at| statistics[at]).collect(),
             // What cannot be of the scene need not be described.
             Err(_) if !self.impossible.is_empty() => Vec::new(),
-            Err(error) => return Err(error.into()),
+            Err(error) => {
+                // What is doubtful about it may be why: depths in another unit show no grains.
+                self.doubts.iter().for_each(|doubt| note(&format!("note: {doubt}")));
+                return Err(error.into());
+            }
         });
         Ok(reading.limits.and_then(|limits| limits.places_of(&recording)))
     }
