@@ -1,7 +1,8 @@
 //! Is one of several pours another than the rest?
 //!
-//! A wrong recording among ten moves their mean by a tenth of what is wrong with it, which a test of the mean, or of how
-//! much all differ, need not see. With `y_i` the pours on axes of uncorrelated noise and `s_j` the noise at the fit,
+//! A wrong recording among ten moves their mean by a tenth of what is wrong with it, which a test of the mean, or of
+//! how much all differ, need not see. With `y_i` the pours on axes of uncorrelated noise and `s_j` the noise at the
+//! fit,
 //!
 //! ```text
 //! d_i = k / (k - 1) sum_j (y_ij - mean_j)^2 / s_j^2

@@ -239,8 +239,8 @@ impl Recording {
     /// The mean of depth images in memory, row by row in metres, of a camera with this lens; `name` stands in messages.
     ///
     /// # Errors
-    /// [`DatasetError::Content`] for no image, one of another size than the lens, a depth of more than 100 m, or a focal
-    /// length that is not in pixels.
+    /// [`DatasetError::Content`] for no image, one of another size than the lens, a depth of more than 100 m, or a
+    /// focal length that is not in pixels.
     pub fn of_depths(
         name: &Path,
         lens: Intrinsics,
