@@ -233,6 +233,7 @@ def test_what_cannot_be_is_refused_by_name() -> None:
         (lambda: simulation.advance(-1.0), ValueError, "seconds must be at least 0, got -1"),
         (lambda: simulation.advance(np.nan), ValueError, "seconds must be at least 0, got nan"),
         (lambda: simulation.advance(word), TypeError, "seconds must be a number, got 'drop'"),
+        (lambda: simulation.advance(1e-4), ValueError, "at least half a substep of 0.0011"),
         (lambda: simulation.advance_to(np.nan), ValueError, "time must be a number of seconds"),
         (lambda: simulation.frames(1e-4), ValueError, "every must be at least a substep, 0.0011"),
         (lambda: gc.simulate(DROP, every=0.0), ValueError, "every must be at least a substep"),

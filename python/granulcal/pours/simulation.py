@@ -69,11 +69,17 @@ class Simulation:
 
         Raises:
             TypeError: no number.
-            ValueError: NaN, or below 0.
+            ValueError: NaN, below 0, or less than half a substep but 0, which a loop would repeat
+                without an end.
         """
         check_real("seconds", seconds)
         if not seconds >= 0.0:
             raise ValueError(f"seconds must be at least 0, got {seconds:g}")
+        if 0.0 < seconds < 0.5 * self.substep:
+            raise ValueError(
+                f"seconds must be 0 or at least half a substep of {self.substep:g} s, for it is "
+                f"rounded to whole ones; got {seconds:g}"
+            )
         self.native.advance_to(self.time + float(seconds))
 
     def advance_to(self, time: float) -> None:
