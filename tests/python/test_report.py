@@ -12,6 +12,7 @@ from granulcal.bayessim.check.identifiability import NO_TRACE, Identifiability
 from granulcal.bayessim.check.misfit import Misfit, OddPour, StatisticMisfit
 from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.bayessim.network.mixture import Mixture
+from granulcal.commands.misfit import print_misfit
 from granulcal.parameter import Parameter
 from granulcal.pours.formation_image import common_field, height_grid
 from granulcal.pours.profile_picture import profile_band, radial_profile
@@ -146,6 +147,13 @@ def test_the_page_says_whether_the_measurement_is_inside_the_model(page):
     text = page.read_text()
     assert "Outside the model:" in text and "explain these 2 pours" in text and "+4.56" in text
     assert text.count("too large") == 1
+
+
+def test_the_recording_of_an_odd_pour_is_named(capsys):
+    odd = OddPour(number=2, times=3.5, p_value=0.001)
+    found = Misfit(3, 0.5, 0.6, (), "inside the model", 0.4, odd)
+    print_misfit(found, ["a.png", "c.png", "b.png"])
+    assert capsys.readouterr().out == "inside the model\n  pour 2 is c.png\n"
 
 
 def test_pours_of_two_materials_are_told_as_such(posterior, small_data, small_pour, tmp_path):

@@ -4,7 +4,6 @@ import argparse
 import json
 import sys
 import warnings
-from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ from granulcal.commands.cluster import add_cluster, cluster_of
 from granulcal.commands.counts import pour_count, seed_number, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import UNHEALTHY
+from granulcal.commands.misfit import odd_pour_of, print_misfit
 from granulcal.commands.observed import add_observed, measured_of, not_measured
 from granulcal.commands.parameters import parameters_of, print_parameters
 from granulcal.commands.reading import (
@@ -146,7 +146,7 @@ def _document(
         "inside_model": {
             "is_inside": found.misfit.is_inside,
             "p_value": found.misfit.p_value,
-            "odd_pour": asdict(found.misfit.odd_pour) if found.misfit.odd_pour else None,
+            "odd_pour": odd_pour_of(found.misfit),
             "impossible": [],
         },
         "pours": len(found.x),
@@ -170,7 +170,7 @@ def _say(
         del document["samples"]
         print(json.dumps(document, indent=1))
         return exit_code_of(recordings, found.misfit.is_inside)
-    print(found.misfit)
+    print_misfit(found.misfit, options.recording)
     print_parameters(document["parameters"])
     print(taken_for_known)
     print(f"{found.rounds[-1]}; {found.choice}")

@@ -5,11 +5,11 @@ import json
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from granulcal.commands.exit_code import DONE, UNHEALTHY
+from granulcal.commands.misfit import odd_pour_of, print_misfit
 from granulcal.commands.parameters import parameters_of, print_parameters
 from granulcal.files import write_beside
 from granulcal.pours.scene import Scene
@@ -136,7 +136,7 @@ def run(options: argparse.Namespace, folder: Path, document: dict[str, Any]) -> 
                 each.name: {"residual": each.residual, "p_value": each.p_value}
                 for each in misfit.statistics
             },
-            "odd_pour": asdict(misfit.odd_pour) if misfit.odd_pour else None,
+            "odd_pour": odd_pour_of(misfit),
         },
         "identifiability": known.as_dict(),
         "calibrated": document.get("is_calibrated") is True,
@@ -150,7 +150,7 @@ def run(options: argparse.Namespace, folder: Path, document: dict[str, Any]) -> 
         )
         print(json.dumps({**found, **drawn}, indent=1))
     else:
-        print(misfit)
+        print_misfit(misfit, options.recording)
         print_parameters(found["parameters"])
         print(known)
         if line := assumed(document["scene_toml"], model.prior):

@@ -3,13 +3,13 @@
 import argparse
 import shlex
 import sys
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from granulcal.commands import observed
 from granulcal.commands.counts import pour_count, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import UNHEALTHY
+from granulcal.commands.misfit import odd_pour_of, print_misfit
 from granulcal.commands.other_prior import difference
 from granulcal.commands.reading import (
     TRAINING,
@@ -182,7 +182,7 @@ def _tell(
     from granulcal.pours.left_out import LeftOut
 
     if not found.misfit.is_inside or found.misfit.odd_pour:
-        print(found.misfit)
+        print_misfit(found.misfit, options.recording)
     print(found.report)
     left_out = LeftOut.of_pours([*found.pours, *found.prior_pours])
     if left_out.total:
@@ -192,7 +192,7 @@ def _tell(
         "inside_model": {
             "is_inside": found.misfit.is_inside,
             "p_value": found.misfit.p_value,
-            "odd_pour": asdict(found.misfit.odd_pour) if found.misfit.odd_pour else None,
+            "odd_pour": odd_pour_of(found.misfit),
         },
         "left_out": left_out.to_dict(),
         "warnings": doubtful,

@@ -142,6 +142,9 @@ impl<'a> Report<'a> {
             return print_line("No posterior is given.");
         };
         print_line(&found.misfit.to_string())?;
+        if let Some(odd) = &found.misfit.odd_pour {
+            print_line(&format!("  pour {} is {}", odd.number, self.recordings[odd.number - 1]))?;
+        }
         print_line(&format!("{:<30}{:>10}{:>10}   90 % interval", "parameter", "mode", "mean"))?;
         for (m, &mode) in found.marginals.iter().zip(&found.mode) {
             let [mode, mean, low, high] = [mode, m.mean, m.interval90.0, m.interval90.1]
