@@ -7,7 +7,7 @@ mod recording;
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use granulcal_dataset::{
     CameraFile, Dataset, DatasetError, Folder, Npz, Prior, load_prior, load_scene, npy, png,
     read_checkpoint_header, read_text,
@@ -74,7 +74,11 @@ fn inspect(path: &Path, is_whole: &mut bool) -> anyhow::Result<Value> {
         "bag" | "mcap" => recording::facts(path, is_whole),
         other => {
             // What is not there has no wrong ending.
-            fs::metadata(path).with_context(|| format!("cannot read {}", path.display()))?;
+            fs::metadata(path).map_err(|source| DatasetError::Io {
+                action: "read",
+                path: path.to_owned(),
+                source,
+            })?;
             let found = if other.is_empty() { "no ending" } else { other };
             let allowed = "a folder or .parquet, .toml, .npy, .npz, .png, .bag, .mcap, .ckpt";
             let path = path.display();
