@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 pub struct Energy {
     /// Of translation and rotation, at the time of the positions `[m^2/s^2]`.
     pub kinetic: f64,
-    /// Above the scene's origin, and of what bonds, layers and attractions hold `[m^2/s^2]`.
+    /// Above the scene's origin, and of what bonds and layers hold, not of attractions or a liquid `[m^2/s^2]`.
     pub potential: f64,
 }
 

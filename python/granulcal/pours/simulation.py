@@ -188,10 +188,11 @@ class Simulation:
 
     @property
     def potential_energy(self) -> float:
-        """Of all grains, above the scene's origin, and of what bonds, layers and pulls hold [J].
+        """Of all grains, above the scene's origin, and of what bonds and layers hold [J].
 
-        In a fluid (`effects.fluid`) it is less its lift, and the fluid that moves with the grains
-        counts as theirs. Grains that have left the scene count where they left it.
+        What pulls (`effects.capillary`, `effects.adhesion`) and `effects.liquid` hold is no part of
+        it. In a fluid (`effects.fluid`) it is less its lift, and the fluid that moves with the
+        grains counts as theirs. Grains that have left the scene count where they left it.
         """
         return self.native.energy[1]
 
