@@ -6,19 +6,24 @@ use crate::{DatasetError, files};
 
 /// Numbers of a knot.
 const KNOT: usize = 8;
-/// The columns, in this order; a first line of names may be there or not.
+/// The columns, in this order; a first line of names may be there or not, and has none of these at another place.
 const COLUMNS: &str = "time, x, y, z, qx, qy, qz, qw";
 
 /// The knots of a trajectory: time `[s]`, displacement `[m]`, unit quaternion (x, y, z, w).
 ///
 /// # Errors
-/// [`DatasetError::Io`]; [`DatasetError::Content`] for a line that is not eight numbers.
+/// [`DatasetError::Io`]; [`DatasetError::Content`] for a line that is not eight numbers, or names in another order.
 pub(crate) fn read(path: &Path) -> Result<Vec<[f64; KNOT]>, DatasetError> {
     let text = files::read_text(path)?;
     let mut knots = Vec::new();
-    for (number, line) in text.lines().enumerate() {
+    // Spreadsheets begin a text with a mark of its encoding.
+    for (number, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let line = line.trim();
         let is_names = number == 0 && line.starts_with(|c: char| c.is_alphabetic());
+        if let Some(found) = is_names.then(|| misplaced(line)).flatten() {
+            let wanted = format!("the names {COLUMNS} in this order");
+            return Err(DatasetError::content(path, "line 1", found, wanted));
+        }
         if line.is_empty() || line.starts_with('#') || is_names {
             continue;
         }
@@ -31,6 +36,15 @@ pub(crate) fn read(path: &Path) -> Result<Vec<[f64; KNOT]>, DatasetError> {
         })?);
     }
     Ok(knots)
+}
+
+/// The first of the columns that a line of names has at another place than its own, such as a quaternion's w before x.
+fn misplaced(line: &str) -> Option<String> {
+    let columns: Vec<_> = COLUMNS.split(", ").collect();
+    line.split(',').enumerate().find_map(|(at, name)| {
+        let own = columns.iter().position(|column| column.eq_ignore_ascii_case(name.trim()))?;
+        (own != at).then(|| format!("{} in column {}", columns[own], at + 1))
+    })
 }
 
 /// Why a line is no knot.
@@ -62,6 +76,23 @@ mod tests {
         let message = read(&path).unwrap_err().to_string();
         assert!(message.contains("line 2") && message.contains("qx"), "{message}");
         assert!(message.contains("3 of 8 columns"), "{message}");
+    }
+
+    #[test]
+    fn names_in_another_order_are_refused_and_a_spreadsheets_mark_is_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("way.csv");
+        let read = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            read(&path).map_err(|error| error.to_string())
+        };
+        let message = read("time,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n").unwrap_err();
+        assert!(message.contains("line 1 must be the names time, x, y, z, qx"), "{message}");
+        assert!(message.contains("qw in column 5"), "{message}");
+        let knots = read("\u{feff}Time, X, Y, Z, qx, qy, qz, qw\r\n0,0,0,0,0,0,0,1\r\n").unwrap();
+        assert_eq!(knots, [[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]);
+        // Names of one's own tell no order.
+        assert_eq!(read("t,a,b,c,d,e,f,g\n0,0,0,0,0,0,0,1\n").unwrap(), knots);
     }
 
     #[test]
