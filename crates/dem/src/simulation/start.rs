@@ -1,6 +1,6 @@
 //! Whether the grains of a start are clear of the walls, of each other and of the outflow.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::Simulation;
 use crate::bodies::{Bodies, Within};
@@ -22,8 +22,8 @@ const MAX_DEPTH: f64 = 0.25;
 struct TooDeep {
     /// Of each wall: how many grains, the number of the last, and how deep the deepest is.
     in_walls: BTreeMap<usize, (usize, usize, f64)>,
-    /// How many pairs of grains.
-    pairs: usize,
+    /// The pairs of grains, each once: clumps meet in several spheres, bodies in several points.
+    pairs: BTreeSet<(usize, usize)>,
     /// The deepest pair, and how deep.
     deepest: Option<((usize, usize), f64)>,
 }
@@ -40,11 +40,12 @@ impl TooDeep {
     }
 
     /// Sees two grains in each other, in radii of the smaller.
-    fn in_each_other(&mut self, pair: (usize, usize), depth: f64) {
+    fn in_each_other(&mut self, i: usize, j: usize, depth: f64) {
         if depth <= MAX_DEPTH {
             return;
         }
-        self.pairs += 1;
+        let pair = (i.min(j), i.max(j));
+        self.pairs.insert(pair);
         if self.deepest.is_none_or(|(_, deepest)| depth > deepest) {
             self.deepest = Some((pair, depth));
         }
@@ -91,7 +92,7 @@ impl Simulation {
         }
         match found.deepest {
             Some((deepest, depth)) if may_meet => {
-                let (pairs, allowed) = (found.pairs, MAX_DEPTH);
+                let (pairs, allowed) = (found.pairs.len(), MAX_DEPTH);
                 Err(DemError::StartInEachOther { pairs, deepest, depth, allowed })
             }
             _ => Ok(()),
@@ -127,8 +128,7 @@ impl Simulation {
             }
             let [r_i, r_j] = [i, j].map(|grain| particles.radius(grain));
             let apart = particles.nearest(particles.position(i) - particles.position(j)).norm();
-            let numbers = (i.min(j) / members, i.max(j) / members);
-            found.in_each_other(numbers, (r_i + r_j - apart) / r_i.min(r_j));
+            found.in_each_other(i / members, j / members, (r_i + r_j - apart) / r_i.min(r_j));
         }
     }
 
@@ -159,7 +159,7 @@ fn bodies_too_deep(bodies: &Bodies, around: &ContactContext, found: &mut TooDeep
         let depth = depth / around.radius;
         match within {
             Within::Wall(surface) => found.in_wall(around.walls.owner(surface), body, depth),
-            Within::Body(other) => found.in_each_other((body, other), depth),
+            Within::Body(other) => found.in_each_other(body, other, depth),
         }
     }
 }
@@ -240,6 +240,22 @@ mod tests {
         scene.effects.clump.aspect = 1.5;
         scene.start = at(0.05);
         check(&scene).unwrap();
+    }
+
+    #[test]
+    fn a_pair_that_meets_in_several_places_counts_once() {
+        let mut scene = Scene::drop(0.1);
+        scene.grains.count = 2;
+        let positions = vec![[0.0, 0.0, 0.05], [1e-3, 0.0, 0.05]];
+        scene.start = Start::Positions { positions: positions.clone() };
+        scene.effects.clump.aspect = 1.5;
+        let text = check(&scene).unwrap_err().to_string();
+        assert!(text.starts_with("1 pair(s)"), "{text}");
+        scene.effects.clump.aspect = 1.0;
+        scene.grains.shape = Some(GrainShape::Box { aspect: [1.0; 3] });
+        scene.start = Start::Poses { positions, orientations: vec![[0.0, 0.0, 0.0, 1.0]; 2] };
+        let text = check(&scene).unwrap_err().to_string();
+        assert!(text.starts_with("1 pair(s)"), "{text}");
     }
 
     #[test]
