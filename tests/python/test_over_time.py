@@ -45,6 +45,14 @@ def test_a_grain_that_is_let_go_falls_along_a_parabola() -> None:
     assert np.ptp(total[falls]) < 1e-9 * total[0]
 
 
+def test_a_grain_that_rests_has_the_energy_that_is_stated_of_it() -> None:
+    simulation = gc.Simulation(one_grain(0.01))
+    simulation.advance(9.0)
+    assert simulation.status == "at_rest" and abs(simulation.velocities[0, 2]) < 1e-9
+    told = simulation.kinetic_energy / simulation.masses.sum()
+    assert told == pytest.approx((GRAVITY * simulation.substep) ** 2 / 8, rel=1e-3)
+
+
 def test_a_frame_is_there_at_the_start_at_every_time_and_at_the_end() -> None:
     pour = gc.simulate(DROP, seed=3, every=0.02)
     seen = pour.trajectory
